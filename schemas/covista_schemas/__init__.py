@@ -1,0 +1,1 @@
+"""What crosses the air between robots, station and mission control."""

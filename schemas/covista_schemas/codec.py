@@ -1,0 +1,271 @@
+"""Between bytes on the wire and messages; one error type, `DecodeError`, says which field is wrong and why.
+
+Its codes are a closed list (`CODES`), so that they can be counted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TypeVar
+
+import numpy as np
+from google.protobuf.message import DecodeError as ProtobufDecodeError
+from google.protobuf.message import Message
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from covista_schemas import keys
+from covista_schemas import robot_pb2 as pb
+from covista_schemas.errors import DecodeError, KeyExpressionError
+from covista_schemas.messages import (
+    DESCRIPTOR_BYTES,
+    UNIT_TOLERANCE,
+    Camera,
+    Distortion,
+    FeatureKind,
+    Features,
+    Keyframe,
+    Pose,
+    PoseUpdate,
+)
+
+KEYFRAME_ENCODING = "application/protobuf;covista.v1.Keyframe"
+POSE_ENCODING = "application/protobuf;covista.v1.Pose"
+MAX_FEATURES = 20_000
+
+MALFORMED = "malformed"
+WRONG_ID = "wrong_id"
+BAD_CAMERA = "bad_camera"
+BAD_POSE = "bad_pose"
+BAD_FEATURES = "bad_features"
+UNKNOWN_DESCRIPTOR = "unknown_descriptor"
+NO_CONTENT = "no_content"
+BAD_IMAGE = "bad_image"
+IMAGE_TOO_LARGE = "image_too_large"
+CODES = (
+    MALFORMED,
+    WRONG_ID,
+    BAD_CAMERA,
+    BAD_POSE,
+    BAD_FEATURES,
+    UNKNOWN_DESCRIPTOR,
+    NO_CONTENT,
+    BAD_IMAGE,
+    IMAGE_TOO_LARGE,
+)
+
+_M = TypeVar("_M", bound=Message)
+_Vector = tuple[float, float, float]
+_Quaternion = tuple[float, float, float, float]
+_NO_MOTION: tuple[_Vector, _Quaternion] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+
+
+def encode_keyframe(keyframe: Keyframe) -> bytes:
+    """Bytes of a keyframe, `covista.v1.Keyframe`."""
+    message = pb.Keyframe(
+        robot=keyframe.robot,
+        boot=keyframe.boot,
+        sequence=keyframe.sequence,
+        time_ns=keyframe.pose.time_ns,
+        camera=_encode_camera(keyframe.camera),
+        world_from_camera=_encode_transform(keyframe.pose),
+        covariance=keyframe.pose.covariance,
+    )
+    if keyframe.image is not None:
+        message.image = keyframe.image
+    elif keyframe.features is not None:
+        message.features.CopyFrom(_encode_features(keyframe.features, keyframe.thumbnail))
+    return message.SerializeToString()
+
+
+def encode_pose(update: PoseUpdate) -> bytes:
+    """Bytes of a pose, `covista.v1.Pose`."""
+    return pb.Pose(
+        robot=update.robot,
+        boot=update.boot,
+        sequence=update.sequence,
+        time_ns=update.pose.time_ns,
+        world_from_camera=_encode_transform(update.pose),
+        covariance=update.pose.covariance,
+    ).SerializeToString()
+
+
+def decode_keyframe(data: bytes, *, robot: str | None = None) -> Keyframe:
+    """The keyframe in `data`; with `robot`, the id inside must be that of the key. Raises DecodeError."""
+    message = _parse(pb.Keyframe(), data)
+    _check_sender(message.robot, message.boot, robot)
+    camera = _decode_camera(message.camera)
+    pose = _decode_pose(message, tuple(message.covariance))
+    image: bytes | None = None
+    features: Features | None = None
+    thumbnail: bytes | None = None
+    match message.WhichOneof("content"):
+        case "image":
+            image = message.image
+        case "features":
+            features = _decode_features(message.features, camera)
+            thumbnail = message.features.thumbnail or None
+        case _:
+            raise DecodeError(NO_CONTENT, "content", "neither an image nor features")
+    return Keyframe(message.robot, message.boot, message.sequence, camera, pose, image, features, thumbnail)
+
+
+def decode_pose(data: bytes, *, robot: str | None = None) -> PoseUpdate:
+    """The pose in `data`; with `robot`, the id inside must be that of the key. Raises DecodeError."""
+    message = _parse(pb.Pose(), data)
+    _check_sender(message.robot, message.boot, robot)
+    pose = _decode_pose(message, tuple(message.covariance))
+    return PoseUpdate(message.robot, message.boot, message.sequence, pose)
+
+
+def _parse(message: _M, data: bytes) -> _M:
+    try:
+        message.ParseFromString(data)
+    except ProtobufDecodeError as error:
+        name = message.DESCRIPTOR.full_name
+        raise DecodeError(MALFORMED, "payload", f"{len(data)} bytes that are not a {name}") from error
+    return message
+
+
+def _check_sender(robot: str, boot: str, expected: str | None) -> None:
+    for field, value in (("robot", robot), ("boot", boot)):
+        try:
+            keys.check_id(value, field)
+        except KeyExpressionError as error:
+            raise DecodeError(WRONG_ID, field, str(error)) from error
+    if expected is not None and robot != expected:
+        raise DecodeError(WRONG_ID, "robot", f"{robot!r} inside, but {expected!r} in the key")
+
+
+def _encode_camera(camera: Camera) -> pb.Camera:
+    message = pb.Camera(**camera.model_dump(exclude={"distortion"}))
+    if camera.distortion.model != "none":
+        message.distortion.model = camera.distortion.model
+        message.distortion.coefficients.extend(camera.distortion.coefficients)
+    return message
+
+
+def _decode_camera(message: pb.Camera) -> Camera:
+    try:
+        return Camera(
+            fx=message.fx,
+            fy=message.fy,
+            cx=message.cx,
+            cy=message.cy,
+            width=message.width,
+            height=message.height,
+            distortion=Distortion.model_validate(
+                {
+                    "model": message.distortion.model or "none",
+                    "coefficients": tuple(message.distortion.coefficients),
+                }
+            ),
+        )
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(str(part) for part in (*_prefix(error), *first["loc"]))
+        raise DecodeError(
+            BAD_CAMERA, f"camera.{where}".rstrip("."), f"{first['msg']}, got {first['input']!r}"[:300]
+        ) from error
+
+
+def _prefix(error: ValidationError) -> tuple[str, ...]:
+    return ("distortion",) if error.title == "Distortion" else ()
+
+
+def _encode_transform(pose: Pose) -> pb.Transform:
+    return pb.Transform(position_m=pose.position_m, orientation_xyzw=pose.orientation_xyzw)
+
+
+def _decode_pose(message: pb.Keyframe | pb.Pose, covariance: tuple[float, ...]) -> Pose:
+    if message.HasField("world_from_camera"):
+        position, orientation = _decode_transform(message.world_from_camera, "world_from_camera")
+    elif message.HasField("world_from_body"):
+        outer = _decode_transform(message.world_from_body, "world_from_body")
+        has_mount = message.HasField("body_from_camera")
+        inner = _decode_transform(message.body_from_camera, "body_from_camera") if has_mount else _NO_MOTION
+        position, orientation = _compose(outer, inner)
+    else:
+        raise DecodeError(BAD_POSE, "world_from_camera", "no pose given")
+    try:
+        return Pose(position, orientation, message.time_ns, covariance)
+    except ValueError as error:
+        raise DecodeError(BAD_POSE, "pose", str(error)) from error
+
+
+def _decode_transform(message: pb.Transform, field: str) -> tuple[_Vector, _Quaternion]:
+    position = _numbers(message.position_m, 3, f"{field}.position_m")
+    orientation = _numbers(message.orientation_xyzw, 4, f"{field}.orientation_xyzw")
+    norm = math.hypot(*orientation)
+    if abs(norm - 1.0) > UNIT_TOLERANCE:
+        raise DecodeError(BAD_POSE, f"{field}.orientation_xyzw", f"length {norm:.4g}, not 1")
+    x, y, z, w = (value / norm for value in orientation)
+    return (position[0], position[1], position[2]), (x, y, z, w)
+
+
+def _numbers(values: Sequence[float], count: int, field: str) -> Sequence[float]:
+    if len(values) != count:
+        raise DecodeError(BAD_POSE, field, f"{len(values)} numbers, not {count}")
+    if not all(math.isfinite(value) for value in values):
+        raise DecodeError(BAD_POSE, field, "numbers that are not finite")
+    return values
+
+
+def _compose(
+    world_from_body: tuple[_Vector, _Quaternion], body_from_camera: tuple[_Vector, _Quaternion]
+) -> tuple[_Vector, _Quaternion]:
+    """world_from_camera: rotations as quaternion products, p = p_wb + R_wb p_bc."""
+    (position, q), (lever, r) = world_from_body, body_from_camera
+    vector, scalar = np.array(q[:3]), q[3]
+    turned = np.cross(vector, lever) * 2.0
+    moved = np.array(position) + np.array(lever) + scalar * turned + np.cross(vector, turned)
+    xyz = scalar * np.array(r[:3]) + r[3] * vector + np.cross(vector, r[:3])
+    w = scalar * r[3] - float(vector @ np.array(r[:3]))
+    x, y, z = (float(value) for value in moved)
+    return (x, y, z), (float(xyz[0]), float(xyz[1]), float(xyz[2]), w)
+
+
+def _encode_features(features: Features, thumbnail: bytes | None) -> pb.Features:
+    return pb.Features(
+        kind=features.kind.value,
+        count=len(features),
+        keypoints=np.ascontiguousarray(features.keypoints_px, "<f4").tobytes(),
+        descriptors=features.descriptors.tobytes(),
+        thumbnail=thumbnail or b"",
+    )
+
+
+def _decode_features(message: pb.Features, camera: Camera) -> Features:
+    try:
+        kind = FeatureKind(message.kind)
+    except ValueError as error:
+        known = ", ".join(FeatureKind)
+        raise DecodeError(UNKNOWN_DESCRIPTOR, "features.kind", f"{message.kind[:40]!r}, not one of {known}") from error
+    n = message.count
+    if n > MAX_FEATURES:
+        raise DecodeError(BAD_FEATURES, "features.count", f"{n} features, more than {MAX_FEATURES}")
+    if len(message.keypoints) != 8 * n:
+        raise DecodeError(
+            BAD_FEATURES, "features.keypoints", f"{len(message.keypoints)} bytes for {n} points, not {8 * n}"
+        )
+    points = np.frombuffer(message.keypoints, "<f4").reshape(n, 2)
+    try:
+        features = Features.from_arrays(kind, points, _descriptors(kind, n, message.descriptors))
+    except ValueError as error:
+        raise DecodeError(BAD_FEATURES, "features", str(error)) from error
+    inside = (points >= -0.5).all() and (points[:, 0] < camera.width).all() and (points[:, 1] < camera.height).all()
+    if not inside:
+        raise DecodeError(BAD_FEATURES, "features.keypoints", f"points outside of {camera.width} x {camera.height} px")
+    return features
+
+
+def _descriptors(kind: FeatureKind, n: int, data: bytes) -> NDArray[np.generic]:
+    width = DESCRIPTOR_BYTES[kind]
+    if len(data) == n * width:
+        return np.frombuffer(data, np.uint8).reshape(n, width)
+    if kind is FeatureKind.ROOTSIFT and len(data) == 4 * n * width:
+        return np.frombuffer(data, "<f4").reshape(n, width)
+    raise DecodeError(
+        BAD_FEATURES, "features.descriptors", f"{len(data)} bytes for {n} {kind} descriptors of {width} bytes"
+    )

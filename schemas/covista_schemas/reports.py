@@ -1,0 +1,302 @@
+"""The pydantic models of everything that the station tells: REST and zenoh say the same with these."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from enum import StrEnum
+from typing import Annotated, Literal, Self
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+from covista_schemas.keys import ID_PATTERN
+from covista_schemas.messages import Camera
+
+RobotId = Annotated[str, Field(pattern=f"^{ID_PATTERN}$", examples=["r1"])]
+Share = Annotated[float, Field(ge=0, le=1)]
+Point = tuple[float, float]
+Polygon = list[Point]
+
+
+def _utc(value: datetime) -> datetime:
+    return value.astimezone(UTC) if value.tzinfo else value.replace(tzinfo=UTC)
+
+
+Time = Annotated[datetime, AfterValidator(_utc)]
+
+
+def time_of(time_ns: int) -> datetime:
+    """A moment in ns since the epoch as UTC time (microseconds are what RFC 3339 readers keep)."""
+    seconds, rest = divmod(time_ns, 1_000_000_000)
+    return datetime.fromtimestamp(seconds, UTC).replace(microsecond=rest // 1000)
+
+
+class Report(BaseModel):
+    """What all answers share: frozen; readers ignore fields that they do not know."""
+
+    model_config = ConfigDict(frozen=True)
+
+
+class Status(StrEnum):
+    """Presence of a robot: live, stale (silent), gone (silent for long)."""
+
+    LIVE = "live"
+    STALE = "stale"
+    GONE = "gone"
+
+
+class FoundBy(StrEnum):
+    """How an overlap was found, best first."""
+
+    IMAGE = "image"
+    PREDICTED = "predicted"
+    DECAYED = "decayed"
+    UNKNOWN = "unknown"
+
+
+class KeyframeId(Report):
+    """Which keyframe of a robot: boot id and sequence."""
+
+    boot: str
+    sequence: int
+
+
+class Counters(Report):
+    """What became of a robot's messages since the station first heard of it, all boots.
+
+    sent = received + missing; received = used + replaced + duplicate + the sum of dropped + waiting.
+    """
+
+    received: int = 0
+    used: int = 0
+    replaced: int = 0
+    duplicate: int = 0
+    missing: int = 0
+    waiting: int = Field(default=0, description="Received and not yet taken up.")
+    dropped: dict[str, int] = Field(default_factory=dict, description="Count by reason.")
+
+
+class PoseReport(Report):
+    """Camera pose in the world: metres, unit quaternion world_from_camera."""
+
+    position_m: tuple[float, float, float]
+    orientation_xyzw: tuple[float, float, float, float]
+    time: Time
+
+
+class PoseCorrection(Report):
+    """How far the images say that the reported pose is off."""
+
+    deg: float
+    m: float
+
+
+class RobotReport(Report):
+    """What the station knows of one robot."""
+
+    id: RobotId
+    status: Status
+    group: str | None = Field(description="Label of its group, or null.", examples=["g1"])
+    pose: PoseReport | None
+    camera: Camera | None
+    boot: str | None = Field(description="The boot that it was last heard from.")
+    keyframe: KeyframeId | None = Field(description="Its newest keyframe in use.")
+    last_seen: Time | None
+    clock_offset_s: float | None = Field(description="Sensor time minus arrival time of its last message.")
+    pose_correction: PoseCorrection | None
+    keyframes: Counters
+    poses: Counters
+    last_problem: str | None = Field(description="Why its last dropped message was dropped.")
+
+
+class RobotsReport(Report):
+    """All robots."""
+
+    robots: list[RobotReport]
+
+
+class PairKeyframes(Report):
+    """The two keyframes that an overlap was measured on."""
+
+    a: KeyframeId
+    b: KeyframeId
+
+
+class PairSummary(Report):
+    """The overlap of two robots' views; `overlap_a` is the share of a's image that b sees."""
+
+    a: RobotId
+    b: RobotId
+    overlap_a: Share | None
+    overlap_b: Share | None
+    interval_a: tuple[float, float] | None = Field(default=None, description="90 % interval; null until measured.")
+    interval_b: tuple[float, float] | None = None
+    found_by: FoundBy
+    outcome: str = Field(description="What the last survey of the pair came to, by name.", examples=["measured"])
+    inliers: int
+    pose_source: Literal["reported", "images"] | None
+    age_s: float | None = Field(description="Seconds since the answer was computed.")
+    keyframes: PairKeyframes | None
+
+
+class PlaneReport(Report):
+    """One plane of a pair's scene, normal . X + offset_m = 0 in the world frame, and where both cameras see it."""
+
+    normal: tuple[float, float, float]
+    offset_m: float
+    support: int = Field(description="Matched points on it.")
+    polygon_a: Polygon
+    polygon_b: Polygon
+
+
+class PairReport(PairSummary):
+    """One pair in full: the common field as polygons in pixels of each image, and the planes behind it."""
+
+    regions_a: list[Polygon]
+    regions_b: list[Polygon]
+    planes: list[PlaneReport]
+
+
+class PairsReport(Report):
+    """Pairs of robots, each unordered pair once."""
+
+    pairs: list[PairSummary]
+
+
+Matrix = list[list[float]]
+
+
+class SimilarityReport(Report):
+    """The similarity matrix (Eq. 16), rows and columns in the order of `robots`; null is unknown."""
+
+    revision: int
+    robots: list[RobotId]
+    similarity: Matrix
+    overlap: list[list[float | None]] = Field(description="Row i: share of i's image seen by j.")
+    closeness: Matrix = Field(description="Eq. 15.")
+    distance_m: Matrix
+
+
+class Group(Report):
+    """A group: a label that follows it over time, and its robots."""
+
+    label: str = Field(examples=["g1"])
+    robots: list[RobotId]
+
+
+class Ungrouped(Report):
+    """A robot that stands in no group, and why."""
+
+    robot: RobotId
+    reason: Literal["no_pose", "gone"]
+
+
+class Score(Report):
+    """Score of one number of groups under the criterion in force."""
+
+    groups: int
+    score: float
+
+
+class GroupBounds(Report):
+    """Least and largest number of groups to consider."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    min: int = Field(ge=1)
+    max: int = Field(ge=1)
+
+    @model_validator(mode="after")
+    def _order(self) -> Self:
+        if self.min > self.max:
+            raise ValueError("min must not be larger than max")
+        return self
+
+
+class LiveSettings(Report):
+    """The settings that can change while the station runs."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    alpha: float = Field(default=0.5, ge=0, le=1, description="Weight of the overlap against closeness, Eq. 16.")
+    groups: Literal["auto"] | Annotated[int, Field(ge=1)] | GroupBounds = Field(
+        default="auto", description="auto, a number of groups, or bounds on it."
+    )
+    sigma: Literal["std"] | Annotated[float, Field(gt=0, allow_inf_nan=False)] = Field(
+        default="std", description="Range of Eq. 15: std (standard deviation of all distances), or metres."
+    )
+    criterion: Literal["fiedler", "paper"] = Field(
+        default="fiedler", description="How the number of groups is chosen: Eq. 17, with M = 1 or as printed."
+    )
+
+
+class GroupsReport(Report):
+    """The grouping in force, and why."""
+
+    revision: int
+    time: Time
+    groups: list[Group]
+    ungrouped: list[Ungrouped]
+    criterion: str
+    scores: list[Score]
+    settings: LiveSettings
+
+
+class OwnGroupReport(Report):
+    """What a robot is told: its group, or none."""
+
+    robot: RobotId
+    label: str | None
+    robots: list[RobotId] = Field(description="All members, the robot itself included.")
+    revision: int
+    time: Time
+
+
+class EventKind(StrEnum):
+    """Kinds of events."""
+
+    GROUPS = "groups"
+    JOIN = "join"
+    LEAVE = "leave"
+    SPLIT = "split"
+    MERGE = "merge"
+    MOVED = "moved"
+    STATUS = "status"
+    SETTINGS = "settings"
+    WARNING = "warning"
+
+
+class EventReport(Report):
+    """Something that happened, with the robots and group labels concerned."""
+
+    id: int
+    event: EventKind
+    time: Time
+    robots: list[RobotId] = []
+    labels: list[str] = []
+    revision_before: int | None = None
+    revision_after: int | None = None
+    text: str
+
+
+class Problem(Report):
+    """RFC 9457 problem details."""
+
+    type: str = "about:blank"
+    title: str = Field(examples=["Unknown robot"])
+    status: int = Field(examples=[404])
+    detail: str | None = None
+    instance: str | None = None
+
+
+class PartHealth(Report):
+    """One part of the station: whether it works, and a word for a person."""
+
+    status: Literal["ready", "degraded", "starting", "stopping"]
+    detail: str | None = None
+
+
+class Health(Report):
+    """How the station is."""
+
+    status: Literal["ready", "degraded", "starting", "stopping"]
+    parts: dict[str, PartHealth] = {}

@@ -1,0 +1,1 @@
+"""The core of the station, without I/O or clock: events in, effects out."""

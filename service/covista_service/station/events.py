@@ -1,0 +1,194 @@
+"""What happens to the station (events), what it wants done (effects), and what it tells of (happenings)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from covista_schemas.reports import EventKind
+
+from covista_service.perception.camera import Camera, Features, Pose, View
+from covista_service.perception.survey import Survey
+
+Topic = Literal["keyframe", "pose"]
+Pair = tuple[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class KeyframeId:
+    """Names a keyframe for ever."""
+
+    robot: str
+    boot: str
+    sequence: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Keyframe:
+    """A keyframe inside the station; `features` is None until they are extracted from `image` (encoded bytes)."""
+
+    id: KeyframeId
+    time_ns: int
+    arrived_ns: int
+    camera: Camera
+    pose: Pose
+    image: bytes | None = None
+    features: Features | None = None
+    thumbnail: bytes | None = None
+
+
+# Events
+
+
+@dataclass(frozen=True, slots=True)
+class MessagesReceived:
+    """Messages of one robot and topic that arrived since the last such event, in order of arrival.
+
+    `sequences` names each (boot, sequence); `kept` is the one that follows as an event of its own, if any: the others
+    were replaced in the mailbox, or are duplicates. Messages so broken that not even their sequence could be read
+    come as MessageDropped with `counted=False`.
+    """
+
+    robot: str
+    topic: Topic
+    sequences: tuple[tuple[str, int], ...]
+    kept: tuple[str, int] | None
+    arrived_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class MessageDropped:
+    """A message that cannot be used; `counted` says whether a MessagesReceived has named it before."""
+
+    robot: str
+    topic: Topic
+    code: str
+    text: str
+    arrived_ns: int
+    counted: bool
+    count: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class KeyframeArrived:
+    """A decoded keyframe, the newest of its robot."""
+
+    keyframe: Keyframe
+
+
+@dataclass(frozen=True, slots=True)
+class PoseArrived:
+    """A decoded pose."""
+
+    robot: str
+    boot: str
+    sequence: int
+    time_ns: int
+    arrived_ns: int
+    pose: Pose
+
+
+@dataclass(frozen=True, slots=True)
+class TokenSeen:
+    """A robot's liveliness token appeared."""
+
+    robot: str
+    boot: str
+
+
+@dataclass(frozen=True, slots=True)
+class TokenLost:
+    """A robot's liveliness token vanished."""
+
+    robot: str
+    boot: str
+
+
+@dataclass(frozen=True, slots=True)
+class FeaturesExtracted:
+    """A worker has extracted a keyframe's features, or says why the image cannot be used (`code`, `problem`)."""
+
+    keyframe: KeyframeId
+    features: Features | None
+    code: str = ""
+    problem: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class SurveyDone:
+    """A worker has surveyed a pair, or failed to (`survey` None, `problem` says why)."""
+
+    first: KeyframeId
+    second: KeyframeId
+    survey: Survey | None
+    problem: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """Time has passed, or a burst of events is over: presence, agenda and groups are brought up to date."""
+
+
+Event = (
+    MessagesReceived
+    | MessageDropped
+    | KeyframeArrived
+    | PoseArrived
+    | TokenSeen
+    | TokenLost
+    | FeaturesExtracted
+    | SurveyDone
+    | Tick
+)
+
+
+# Effects
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ExtractFeatures:
+    """Extract the features of this keyframe's image; the answer is FeaturesExtracted."""
+
+    keyframe: Keyframe
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SurveyPair:
+    """Survey this pair of keyframes, starting from the pair's last result; the answer is SurveyDone."""
+
+    first: KeyframeId
+    second: KeyframeId
+    first_view: View
+    second_view: View
+    prior: Survey | None
+
+
+@dataclass(frozen=True, slots=True)
+class GroupsEvaluated:
+    """Groups were evaluated with these keyframes' first surveys: (keyframe, its arrival time)."""
+
+    keyframes: tuple[tuple[KeyframeId, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class GroupsChanged:
+    """A new revision of the groups stands; `robots` are those whose own group is not what they were told last."""
+
+    revision: int
+    robots: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Happened:
+    """Something that mission control and the history should know."""
+
+    kind: EventKind
+    time_ns: int
+    text: str
+    robots: tuple[str, ...] = ()
+    labels: tuple[str, ...] = ()
+    revision_before: int | None = None
+    revision_after: int | None = None
+
+
+Effect = ExtractFeatures | SurveyPair | GroupsEvaluated | GroupsChanged | Happened
