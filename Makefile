@@ -1,0 +1,73 @@
+# Each target makes or refreshes .venv by itself; all that must be there is Python 3.11+ and make.
+PYTHON ?= python3
+BIN := .venv/bin
+PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
+# Docker's own subcommand on some machines, a program on others.
+COMPOSE ?= $(shell docker compose version >/dev/null 2>&1 && echo docker compose || echo docker-compose)
+STACK := $(COMPOSE) --project-name covista --file docker/compose.yaml
+
+MAKEFLAGS += --no-print-directory
+.DEFAULT_GOAL := help
+.PHONY: help demo test check bench up down compose-test
+
+help: ## Say what there is to make
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1: \2/p' Makefile
+
+demo: .venv/.demo ## A station and six simulated rovers, until Ctrl-C
+	@echo "demo: a station and a simulated swarm; Ctrl-C ends both"
+	@exec $(BIN)/covista-station demo
+
+test: .venv/.dev ## All tests that need no container
+	@echo "test: all tests that need no container"
+	@$(BIN)/pytest
+
+check: .venv/.dev ## Format, lint, types, contracts and tests: what must be green before a push
+	@echo "check: format, lint, types, contracts, tests"
+	@$(BIN)/ruff format --check --quiet
+	@$(BIN)/ruff check --quiet
+	@$(BIN)/mypy
+	@said=$$($(BIN)/lint-imports) || { echo "$$said"; exit 1; }
+	@$(BIN)/pytest
+
+bench: .venv/.dev ## The benchmarks, beside their peers
+	@echo "bench: every benchmark in its short form"
+	@exec $(BIN)/covista-station bench
+
+up: ## Station and rovers as containers, in the background
+	@$(call need_engine)
+	@echo "up: building the images and starting station and rovers"
+	@BASE_IMAGE=$$(docker/base.sh) && export BASE_IMAGE && $(STACK) build --quiet && $(STACK) up --detach
+	@echo "The station answers at http://$$($(STACK) port station 8000)/api/v1/groups; rovers reach it at tcp/$$($(STACK) port station 7447)."
+	@echo "make down ends all; the history stays in the volume covista_history."
+
+down: ## End what make up started
+	@$(call need_engine)
+	@echo "down: ending station and rovers"
+	@$(STACK) down --remove-orphans
+
+compose-test: .venv/.dev ## Station and rovers as containers, seen from outside
+	@echo "compose-test: building, starting and asking station and rovers in containers"
+	@$(BIN)/pytest tests/compose -m compose
+
+# The stamps: what is installed was installed for this pyproject.toml.
+.venv/.demo: pyproject.toml | .venv/bin/python
+	@echo "Installing the station into .venv (a minute or two)"
+	@$(PIP) install --editable '.[station]'
+	@touch $@
+
+.venv/.dev: pyproject.toml | .venv/bin/python
+	@echo "Installing the station and what develops it into .venv (a minute or two)"
+	@$(PIP) install --editable '.[dev]'
+	@touch .venv/.demo $@
+
+.venv/bin/python:
+	@command -v $(PYTHON) >/dev/null || { echo "Covista needs Python 3.11 or newer, and there is no $(PYTHON): make PYTHON=... names another"; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "Covista needs Python 3.11 or newer, and $(PYTHON) is $$($(PYTHON) --version): make PYTHON=... names another"; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { echo "$(PYTHON) cannot make an environment: on Debian, install python3-venv"; exit 1; }
+	@echo "Making .venv with $$($(PYTHON) --version)"
+	@$(PYTHON) -m venv --clear .venv
+
+define need_engine
+docker info >/dev/null 2>&1 || { echo "No Docker engine answers here: start one, or run make demo, which needs none"; exit 1; }
+endef
