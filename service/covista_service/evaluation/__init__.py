@@ -1,0 +1,1 @@
+"""Methods against recordings whose overlap is known: `covista-station evaluate`."""
