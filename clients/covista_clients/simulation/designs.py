@@ -49,7 +49,7 @@ def court(lower_m: Point, upper_m: Point, obstacles: Iterable[Solid], watched: I
 
 def facade(rng: np.random.Generator) -> Design:
     """One wall with thin items on it."""
-    front = wall((-6.0, 0.0), (6.0, 0.0), 5.5, rubble, foot_m=-1.5)
+    front = wall((-8.0, 0.0), (8.0, 0.0), 6.0, rubble, foot_m=-1.8)
     items = []
     for x in np.linspace(-4.4, 4.4, 7):
         width, height = rng.uniform(0.4, 0.9), rng.uniform(0.4, 0.8)
