@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from covista_service.perception.camera import Floats, View
+from covista_service.perception.camera import Floats, View, relative, undistort
+from covista_service.perception.fuzzy import Points
+from covista_service.perception.matching import MatchingOptions, match
+from covista_service.perception.overlap import common_field
+from covista_service.perception.planes import PlaneOptions, find_planes
+from covista_service.perception.polygon import corners
+from covista_service.perception.relative_pose import PoseSource, RelativePoseOptions, Sightings, relative_pose
+from covista_service.perception.triangulation import TriangulationOptions, triangulate
 
 
 class Outcome(StrEnum):
@@ -21,9 +27,6 @@ class Outcome(StrEnum):
     NO_PARALLAX = "no_parallax"
     NO_PLANE = "no_plane"
     KINDS_DIFFER = "kinds_differ"
-
-
-PoseSource = Literal["reported", "images"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,11 +65,85 @@ class Survey:
 
 @dataclass(frozen=True, slots=True)
 class SurveyOptions:
-    """Options of all stages."""
+    """Options of all stages. `min_matches`: with fewer, nothing can be verified."""
 
     seed: int = 0
+    min_matches: int = 8
+    matching: MatchingOptions = field(default_factory=MatchingOptions)
+    pose: RelativePoseOptions = field(default_factory=RelativePoseOptions)
+    triangulation: TriangulationOptions = field(default_factory=TriangulationOptions)
+    planes: PlaneOptions = field(default_factory=PlaneOptions)
 
 
 def survey(first: View, second: View, options: SurveyOptions, prior: Survey | None = None) -> Survey:
-    """Survey a pair of views."""
-    raise NotImplementedError
+    """Survey a pair of views; `prior` is the pair's last survey, to start from."""
+    if first.features.kind != second.features.kind:
+        return Survey(Outcome.KINDS_DIFFER)
+
+    # Matched feature points ...
+    matches = match(first.features, second.features, options.matching)
+    if len(matches) < options.min_matches:
+        return Survey(Outcome.FEW_MATCHES, matches=len(matches))
+    first_px = undistort(first.camera, first.features.keypoints_px[matches[:, 0]])
+    second_px = undistort(second.camera, second.features.keypoints_px[matches[:, 1]])
+
+    # ... that agree with the relative pose, which is as reported unless the images know better ...
+    sightings = Sightings(first.camera, second.camera, first_px, second_px)
+    pose = relative_pose(sightings, *relative(first.pose, second.pose), options.pose, options.seed)
+    found = Survey(
+        Outcome.UNVERIFIED,
+        matches=len(matches),
+        inliers=int(pose.inliers.sum()),
+        pose_source=pose.source,
+        rotation=pose.rotation,
+        translation=pose.translation,
+    )
+    if not pose.verified:
+        return found
+
+    # ... are triangulated ...
+    seen = pose.inliers
+    points = triangulate(
+        first.camera,
+        second.camera,
+        pose.rotation,
+        pose.translation,
+        first_px[seen],
+        second_px[seen],
+        options.triangulation,
+    )
+    kept = points.kept
+    points = points.only(kept)
+    if len(points.rays) < options.planes.min_support:
+        return replace(found, outcome=Outcome.NO_PARALLAX)
+    found = replace(
+        found,
+        points_first_px=first_px[seen][kept],
+        points_second_px=second_px[seen][kept],
+        depths_first=points.depths_first,
+        depths_second=points.depths_second,
+        plane_of_point=np.full(len(points.rays), -1),
+    )
+
+    # ... and grouped into planes by adaptive fuzzy clustering;
+    known = None if prior is None else np.array([-plane.normal for plane in prior.planes]).reshape(-1, 3)
+    cloud = Points(points.rays, points.inverse_depths, points.shifts_px)
+    planes = find_planes(cloud, options.planes, options.seed, known)
+    if not len(planes.normals):
+        return replace(found, outcome=Outcome.NO_PLANE)
+
+    # the common field of view is what both cameras see of those planes.
+    field_of_view = common_field(first.camera, second.camera, pose.rotation, pose.translation, planes.normals)
+    return replace(
+        found,
+        outcome=Outcome.MEASURED,
+        overlap_first=field_of_view.overlap_first,
+        overlap_second=field_of_view.overlap_second,
+        planes=tuple(
+            Plane(normal, int((planes.labels == k).sum()), corners(region_first), corners(region_second))
+            for k, (normal, region_first, region_second) in enumerate(
+                zip(planes.normals, field_of_view.regions_first, field_of_view.regions_second, strict=True)
+            )
+        ),
+        plane_of_point=planes.labels,
+    )

@@ -1,0 +1,144 @@
+"""Adaptive fuzzy clustering of points into planes, with an outlier cluster (Eqs. 1 to 6).
+
+Where the paper clusters points in space, these functions work where noise is uniform: a point is its ray (x, y, 1) in
+the first camera and its inverse depth rho, a plane is rho = c . (x, y, 1), and the distance (4) of a point from a plane
+is how far, in pixels, the plane would put it from where the second image shows it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from covista_service.perception.camera import Floats
+
+_TINY = 1e-12
+
+
+@dataclass(frozen=True, slots=True)
+class FuzzyOptions:
+    """Options of the clustering.
+
+    `delta_px` is the distance at which a point belongs to the outliers as much as to a plane (delta of Eq. 5);
+    `floor` is the share of it below which distances count no further, the volume of Kaymak and Setnes' prototypes.
+    """
+
+    max_clusters: int = 10
+    points_per_cluster: int = 6
+    delta_px: float = 2.0
+    floor: float = 0.5
+    initial_iterations: int = 8
+    iterations: int = 6
+    settled: float = 0.02
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Points:
+    """`rays` (n, 3) with third coordinate 1, `inverse_depths` (n,), `shifts_px` (n,): px per unit of inverse depth."""
+
+    rays: Floats
+    inverse_depths: Floats
+    shifts_px: Floats
+
+    def __len__(self) -> int:
+        return len(self.rays)
+
+    def distances(self, planes: Floats) -> Floats:
+        """Distances (n, K) in px from planes c (K, 3): Eq. 4 as transfer error in the second image."""
+        away: Floats = np.abs(self.rays @ planes.T - self.inverse_depths[:, None]) * self.shifts_px[:, None]
+        return away
+
+
+def cluster(points: Points, options: FuzzyOptions, random: np.random.Generator) -> Floats:
+    """Planes c (K, 3) that the points lie on, as far as clustering finds them; K may be 0."""
+    wanted = min(options.max_clusters, len(points) // options.points_per_cluster)
+    if not wanted:
+        return np.zeros((0, 3))
+    memberships = initial_memberships(points, wanted, options, random)
+    while True:
+        memberships, planes = _settle(points, memberships, options)
+        merged = merge_most_similar(memberships)
+        if merged is None:
+            return planes
+        memberships = merged
+
+
+def initial_memberships(points: Points, count: int, options: FuzzyOptions, random: np.random.Generator) -> Floats:
+    """Memberships (n, count) of fuzzy c-means (1), (2) with m = 2, over place in the image and inverse depth."""
+    place = np.column_stack((points.rays[:, :2], points.inverse_depths))
+    place = (place - place.mean(axis=0)) / (place.std(axis=0) + _TINY)
+    centres = place[random.choice(len(place), count, replace=False)]
+    for _ in range(options.initial_iterations):
+        weights = _fuzzy_memberships(_squared_gaps(place, centres)) ** 2
+        centres = (weights.T @ place) / (weights.sum(axis=0)[:, None] + _TINY)  # (1)
+    return _fuzzy_memberships(_squared_gaps(place, centres))
+
+
+def noise_memberships(distances: Floats, options: FuzzyOptions) -> Floats:
+    """Memberships (n, K) that minimise (5) with m = 2; what is missing to 1 belongs to the outlier cluster."""
+    closeness = np.maximum(distances, options.floor * options.delta_px) ** -2.0
+    memberships: Floats = closeness / (closeness.sum(axis=1) + options.delta_px**-2)[:, None]
+    return memberships
+
+
+def fit(points: Points, weights: Floats) -> Floats:
+    """Planes c (K, 3) through points with `weights` (n, K), least squares in px.
+
+    The centre (1) and the covariance (3) of (x, y, rho) give it: noise lies along rho alone, so the plane holds the
+    centre and has the slope that the covariance tells.
+    """
+    weights = weights * (points.shifts_px**2)[:, None]
+    weights = weights / (weights.sum(axis=0) + _TINY)
+    place = np.column_stack((points.rays[:, :2], points.inverse_depths))
+    centres = weights.T @ place  # (1)
+    products = (place[:, :, None] * place[:, None, :]).reshape(len(place), 9)
+    covariances = (weights.T @ products).reshape(-1, 3, 3) - centres[:, :, None] * centres[:, None, :]  # (3)
+    spread = covariances[:, :2, :2] + (_TINY + 1e-9 * np.trace(covariances[:, :2, :2], axis1=1, axis2=2))[
+        :, None, None
+    ] * np.eye(2)
+    slopes = np.linalg.solve(spread, covariances[:, :2, 2:])[:, :, 0]
+    return np.column_stack((slopes, centres[:, 2] - (slopes * centres[:, :2]).sum(axis=1)))
+
+
+def merge_most_similar(memberships: Floats) -> Floats | None:
+    """Memberships (n, K - 1) with the two most similar clusters made one, or None if none are similar enough (6).
+
+    The threshold counts the outlier cluster, 1 / K for K planes: with 1 / (K - 1) two could never become one.
+    """
+    count = memberships.shape[1]
+    if count < 2:
+        return None
+    sizes = memberships.sum(axis=0)
+    shared = np.minimum(memberships[:, :, None], memberships[:, None, :]).sum(axis=0)
+    inclusion = shared / (np.minimum(sizes[:, None], sizes) + _TINY)
+    np.fill_diagonal(inclusion, -1.0)
+    one, other = np.unravel_index(int(inclusion.argmax()), inclusion.shape)
+    if inclusion[one, other] <= 1.0 / count:
+        return None
+    merged = np.delete(memberships, other, axis=1)
+    merged[:, one - (other < one)] = memberships[:, one] + memberships[:, other]
+    return merged
+
+
+def _settle(points: Points, memberships: Floats, options: FuzzyOptions) -> tuple[Floats, Floats]:
+    """Turn by turn planes from memberships and memberships from planes, until little changes."""
+    for _ in range(options.iterations):
+        planes = fit(points, memberships**2)
+        updated = noise_memberships(points.distances(planes), options)
+        change = np.abs(updated - memberships).max()
+        memberships = updated
+        if change < options.settled:
+            break
+    return memberships, planes
+
+
+def _squared_gaps(place: Floats, centres: Floats) -> Floats:
+    gaps: Floats = ((place[:, None, :] - centres) ** 2).sum(axis=2)
+    return gaps
+
+
+def _fuzzy_memberships(squared: Floats) -> Floats:
+    closeness = 1.0 / (squared + _TINY)
+    memberships: Floats = closeness / closeness.sum(axis=1)[:, None]
+    return memberships

@@ -1,0 +1,63 @@
+"""Correspondences between the features of two images: mutual nearest neighbours that stand out from the second best."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from covista_service.perception.camera import Features
+
+Descriptors = NDArray[np.uint8]
+Distances = NDArray[np.float32]
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True)
+class MatchingOptions:
+    """`ratio` of the best to the second best distance (Lowe, IJCV 2004) that a match may have at most."""
+
+    rootsift_ratio: float = 0.8
+    orb_ratio: float = 0.85
+
+
+def match(first: Features, second: Features, options: MatchingOptions) -> Indices:
+    """Indices (k, 2) of matching keypoints of two sets of one kind; each keypoint at most once."""
+    if not len(first.descriptors) or not len(second.descriptors):
+        return np.zeros((0, 2), np.intp)
+    if first.kind == "rootsift":
+        return mutual(_squared_distances(first.descriptors, second.descriptors), options.rootsift_ratio**2)
+    return mutual(_hamming_distances(first.descriptors, second.descriptors), options.orb_ratio)
+
+
+def mutual(distances: Distances, ratio: float) -> Indices:
+    """Pairs (k, 2) nearest to each other in `distances` (n, n'), at most `ratio` times the second best of both."""
+    nearest = distances.argmin(axis=1)
+    rows = np.arange(len(distances))
+    rows = rows[distances.argmin(axis=0)[nearest] == rows]
+    columns = nearest[rows]
+    best = distances[rows, columns]
+    # A match whose only rival is itself has no second best.
+    second = np.minimum(_second_best(distances[rows]), _second_best(distances[:, columns].T))
+    kept = best <= ratio * second
+    return np.column_stack((rows[kept], columns[kept]))
+
+
+def _second_best(rows: Distances) -> Distances:
+    if rows.shape[1] < 2:
+        return np.full(len(rows), np.inf, np.float32)
+    return np.partition(rows, 1, axis=1)[:, 1]
+
+
+def _squared_distances(first: Descriptors, second: Descriptors) -> Distances:
+    """|a - b|^2 by one matrix product. Bytes make every sum an integer below 2^24: float32 is exact."""
+    a, b = first.astype(np.float32), second.astype(np.float32)
+    distances: Distances = np.einsum("ij,ij->i", a, a)[:, None] + np.einsum("ij,ij->i", b, b) - 2 * (a @ b.T)
+    return distances
+
+
+def _hamming_distances(first: Descriptors, second: Descriptors) -> Distances:
+    distances, _ = cv2.batchDistance(first, second, cv2.CV_32S, normType=cv2.NORM_HAMMING)
+    return np.asarray(distances, np.float32)
