@@ -119,6 +119,22 @@ def decode_pose(data: bytes, *, robot: str | None = None) -> PoseUpdate:
     return PoseUpdate(message.robot, message.boot, message.sequence, pose)
 
 
+def peek_keyframe(data: bytes, *, robot: str | None = None) -> tuple[str, str, int]:
+    """Only (robot, boot, sequence) of the keyframe in `data`, checked as `decode_keyframe` does. Raises DecodeError."""
+    return _peek(pb.Keyframe(), data, robot)
+
+
+def peek_pose(data: bytes, *, robot: str | None = None) -> tuple[str, str, int]:
+    """Only (robot, boot, sequence) of the pose in `data`, checked as `decode_pose` does. Raises DecodeError."""
+    return _peek(pb.Pose(), data, robot)
+
+
+def _peek(message: pb.Keyframe | pb.Pose, data: bytes, robot: str | None) -> tuple[str, str, int]:
+    _parse(message, data)
+    _check_sender(message.robot, message.boot, robot)
+    return message.robot, message.boot, message.sequence
+
+
 def _parse(message: _M, data: bytes) -> _M:
     try:
         message.ParseFromString(data)
