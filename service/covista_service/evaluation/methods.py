@@ -1,0 +1,84 @@
+"""Ways to say how much two images have in common, by name; a new one joins by its line in `METHODS`."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from covista_service.evaluation.case import Answer, Case, Pair
+from covista_service.perception import frustum
+from covista_service.perception.camera import Floats, View
+from covista_service.perception.survey import Outcome, Survey
+
+Method = Callable[[Case], dict[Pair, Answer]]
+NO_CAMERA = Answer("unknown", "no_camera")
+NO_DEPTH = Answer("unknown", "no_depth")
+
+
+def planes(case: Case) -> dict[Pair, Answer]:
+    """Planes of the pair, cut into exact polygons: what the survey of each pair alone says."""
+    answers = {pair: _planes(timed.survey, timed.ms) for pair, timed in case.surveys.items()}
+    return {pair: answers.get(pair, NO_CAMERA) for pair in case.pairs}
+
+
+def frustums(case: Case) -> dict[Pair, Answer]:
+    """View frusta alone: each image taken for a plane, parallel to it, at its median depth over all its pairs."""
+    if case.views is None:
+        return dict.fromkeys(case.pairs, NO_CAMERA)
+    depths = _median_depths(case)
+    return {(a, b): _frustum(case.views[a], depths.get(a), case.views[b], depths.get(b)) for a, b in case.pairs}
+
+
+METHODS: Mapping[str, Method] = {"planes": planes, "frustum": frustums}
+
+
+def _planes(found: Survey, ms: float) -> Answer:
+    measured = found.outcome is Outcome.MEASURED
+    return Answer(
+        found_by="image" if measured else "unknown",
+        outcome=str(found.outcome),
+        overlap_a=found.overlap_first if measured else None,
+        overlap_b=found.overlap_second if measured else None,
+        inliers=found.inliers,
+        planes=len(found.planes),
+        ms=ms,
+    )
+
+
+def _frustum(first: View, first_depth: float | None, second: View, second_depth: float | None) -> Answer:
+    if first_depth is None or second_depth is None:
+        return NO_DEPTH
+    start = time.perf_counter_ns()
+    overlap_a, overlap_b = frustum.overlap(
+        first.camera, first.pose, first_depth, second.camera, second.pose, second_depth
+    )
+    ms = (time.perf_counter_ns() - start) / 1e6
+    return Answer("predicted", "predicted", overlap_a, overlap_b, ms=ms)
+
+
+def _median_depths(case: Case) -> dict[int, float]:
+    """Median depth of each image's points over all its measured pairs; else that of the set it is connected to."""
+    seen: dict[int, list[Floats]] = {}
+    for (a, b), timed in case.surveys.items():
+        if timed.survey.outcome is Outcome.MEASURED:
+            seen.setdefault(a, []).append(timed.survey.depths_first)
+            seen.setdefault(b, []).append(timed.survey.depths_second)
+    own = {index: float(np.median(np.concatenate(depths))) for index, depths in seen.items()}
+    medians = dict(own)
+    for connected in _connected(case.pairs):
+        known = [own[index] for index in connected if index in own]
+        if known:
+            medians.update({index: float(np.median(known)) for index in connected if index not in own})
+    return medians
+
+
+def _connected(pairs: tuple[Pair, ...]) -> list[set[int]]:
+    """Sets of images that the pairs to compare connect."""
+    parts: list[set[int]] = []
+    for pair in pairs:
+        touched = [part for part in parts if not part.isdisjoint(pair)]
+        parts = [part for part in parts if part.isdisjoint(pair)]
+        parts.append(set(pair).union(*touched))
+    return parts

@@ -1,0 +1,131 @@
+"""Run methods over a set, with errors put on its poses, and say how good they are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields
+from typing import Literal
+
+import numpy as np
+from covista_schemas import features
+from covista_schemas.messages import FeatureKind
+
+from covista_service.evaluation import methods
+from covista_service.evaluation.case import Answer, Pair, surveyed
+from covista_service.evaluation.datasets import Dataset, median_depth, picture
+from covista_service.evaluation.files import DATASET, DatasetError
+from covista_service.evaluation.metrics import Metrics, measure
+from covista_service.evaluation.noise import NO_NOISE, PoseNoise, disturbed
+from covista_service.perception.camera import Features, Floats, Pose, View
+from covista_service.perception.survey import SurveyOptions
+
+Input = Literal["images", "features"]
+
+
+@dataclass(frozen=True, slots=True)
+class RunOptions:
+    """What to run: method names of `methods.METHODS`, each over every seed."""
+
+    methods: tuple[str, ...] = ("planes",)
+    input: Input = "images"
+    features: FeatureKind = FeatureKind.ROOTSIFT
+    noise: PoseNoise = NO_NOISE
+    seeds: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """Answers of one method to one set under one seed, pair by pair, and what they are worth."""
+
+    dataset: str
+    method: str
+    input: Input
+    pose_noise: PoseNoise
+    seed: int
+    pairs: tuple[tuple[str, str, Answer], ...]
+    metrics: Metrics
+
+    def as_json(self) -> dict[str, object]:
+        """What `covista-station evaluate --format json` writes of it."""
+        return {
+            "dataset": self.dataset,
+            "method": self.method,
+            "input": self.input,
+            "pose_noise": [self.pose_noise.deg, self.pose_noise.share],
+            "seed": self.seed,
+            "pairs": [{"a": a, "b": b, **_fields(answer)} for a, b, answer in self.pairs],
+            "metrics": _fields(self.metrics),
+        }
+
+
+def evaluate(dataset: Dataset, options: RunOptions, advance: Callable[[], None] = lambda: None) -> Iterator[Evaluation]:
+    """An evaluation for each seed and method; `advance` is called `steps` times on the way."""
+    extracted = _features(dataset, options.features, advance)
+    for seed in range(options.seeds):
+        poses = _poses(dataset, options.noise, np.random.default_rng(seed))
+        case = surveyed(dataset.pairs, _views(dataset, poses, extracted), SurveyOptions(seed=seed), advance)
+        for name in options.methods:
+            answers = methods.METHODS[name](case)
+            yield Evaluation(
+                dataset.name,
+                name,
+                options.input,
+                options.noise,
+                seed,
+                tuple((dataset.frames[a].id, dataset.frames[b].id, answers[a, b]) for a, b in dataset.pairs),
+                judge(dataset.truth, answers),
+            )
+
+
+def steps(dataset: Dataset, options: RunOptions) -> int:
+    """How often `evaluate` calls `advance`."""
+    return len(dataset.frames) + options.seeds * len(dataset.pairs) if _has_cameras(dataset) else 0
+
+
+def judge(truth: Floats, answers: dict[Pair, Answer]) -> Metrics:
+    """Metrics of the answers over all ordered pairs with a defined truth, (n, n)."""
+    rows = [
+        (truth[i, j], overlap, *(interval or (None, None)))
+        for (a, b), answer in answers.items()
+        for i, j, overlap, interval in (
+            (a, b, answer.overlap_a, answer.interval_a),
+            (b, a, answer.overlap_b, answer.interval_b),
+        )
+        if np.isfinite(truth[i, j])
+    ]
+    actual, given, low, high = np.array(rows, np.float64).reshape(-1, 4).T
+    return measure(actual, given, low, high, np.array([answer.ms for answer in answers.values()]))
+
+
+def _has_cameras(dataset: Dataset) -> bool:
+    return all(frame.camera is not None and frame.pose is not None for frame in dataset.frames)
+
+
+def _features(dataset: Dataset, kind: FeatureKind, advance: Callable[[], None]) -> list[Features]:
+    extracted = []
+    for frame in dataset.frames if _has_cameras(dataset) else ():
+        found = features.extract(picture(frame), kind)
+        extracted.append(Features(str(found.kind), found.keypoints_px, found.descriptors))
+        advance()
+    return extracted
+
+
+def _poses(dataset: Dataset, noise: PoseNoise, rng: np.random.Generator) -> list[Pose]:
+    reported = [frame.pose for frame in dataset.frames if frame.pose is not None]
+    if noise.is_none or not reported:
+        return reported
+    depth = median_depth(dataset)
+    if depth is None:
+        raise DatasetError(dataset.folder / DATASET, "depth", "pose noise is a share of the depth, and there is none")
+    return [disturbed(pose, noise, depth, rng) for pose in reported]
+
+
+def _views(dataset: Dataset, poses: Sequence[Pose], extracted: Sequence[Features]) -> tuple[View, ...] | None:
+    cameras = [frame.camera for frame in dataset.frames if frame.camera is not None]
+    if not _has_cameras(dataset):
+        return None
+    return tuple(View(*parts) for parts in zip(cameras, poses, extracted, strict=True))
+
+
+def _fields(record: Answer | Metrics) -> dict[str, object]:
+    return {field.name: getattr(record, field.name) for field in fields(record)}
