@@ -61,7 +61,8 @@ def load(folder: Path) -> Dataset:
 
 def picture(frame: Frame) -> NDArray[np.uint8]:
     """The image of a frame, (H, W, 3) BGR uint8; what is transparent in it is taken as it is coloured."""
-    image = cv2.imread(str(frame.image), cv2.IMREAD_COLOR)
+    # Poses and truth are of the pixels as stored, whatever orientation a tag in the file asks for.
+    image = cv2.imread(str(frame.image), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
     if image is None:
         raise DatasetError(frame.image, "", "cannot be decoded as an image")
     return np.asarray(image, np.uint8)
