@@ -1,0 +1,1 @@
+"""Station and swarm as processes."""
