@@ -46,7 +46,7 @@ if [ -f "$bundle" ]; then settings+=(--change "ENV PIP_CERT=/$trusted"); fi
 if [ "$tool" = mmdebstrap ]; then
   mmdebstrap --quiet --variant=minbase --include="$include" bookworm "$root" >&2
 else
-  debootstrap --variant=minbase --include="$include" bookworm "$root" >&2
+  debootstrap --variant=minbase --include="$include" bookworm "$root" >"$scratch/log" 2>&1 || { tail -n 20 "$scratch/log" >&2; exit 1; }
 fi
 if [ -f "$bundle" ]; then cp --dereference "$bundle" "$root/$trusted"; fi
 rm -rf "$root"/var/cache/apt/archives/*.deb "$root"/var/lib/apt/lists/* "$root"/usr/share/{doc,man,locale}
