@@ -29,7 +29,7 @@ def extract(
     RootSIFT (Arandjelovic and Zisserman, CVPR 2012): SIFT, L1-normalised, square root. Images larger than
     `MAX_SIDE_PX` are shrunk first. An image without texture gives zero features.
     """
-    cv2 = _opencv()
+    cv2 = opencv()
     kind = FeatureKind(kind)
     grey, scale = _shrunk_grey(cv2, image)
     detector: Any = cv2.SIFT_create(count) if kind is FeatureKind.ROOTSIFT else cv2.ORB_create(count)
@@ -56,7 +56,7 @@ def root_sift(sift: NDArray[np.float32]) -> NDArray[np.uint8]:
 
 def thumbnail(image: NDArray[np.uint8], width: int = THUMBNAIL_WIDTH_PX) -> bytes:
     """A small grey JPEG of `image`, for the station to weigh surfaces with."""
-    cv2 = _opencv()
+    cv2 = opencv()
     grey = _grey(cv2, image)
     height = max(1, round(grey.shape[0] * width / grey.shape[1]))
     small = cv2.resize(grey, (width, height), interpolation=cv2.INTER_AREA)
@@ -65,14 +65,30 @@ def thumbnail(image: NDArray[np.uint8], width: int = THUMBNAIL_WIDTH_PX) -> byte
 
 def encode_jpeg(image: NDArray[np.uint8], quality: int = 85) -> bytes:
     """JPEG bytes of an image, (H, W) grey or (H, W, 3) BGR uint8."""
-    cv2 = _opencv()
+    cv2 = opencv()
     done, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
     if not done:
         raise ValueError(f"OpenCV cannot encode an image of shape {image.shape} and type {image.dtype}")
     return bytes(data)
 
 
-def _opencv() -> ModuleType:
+def decode_image(data: bytes) -> NDArray[np.uint8]:
+    """The picture, (H, W, 3) BGR uint8, in JPEG, PNG or WebP bytes, as the sensor took it.
+
+    Raises ValueError where there is none.
+    """
+    cv2 = opencv()
+    buffer = np.frombuffer(data, np.uint8)
+    # Turned by its orientation tag a picture would no longer be the camera's.
+    flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+    image: NDArray[np.uint8] | None = cv2.imdecode(buffer, flags) if len(buffer) else None
+    if image is None:
+        raise ValueError(f"image: {len(data)} bytes that OpenCV cannot decode")
+    return image
+
+
+def opencv() -> ModuleType:
+    """OpenCV, or MissingExtraError where it is not installed."""
     try:
         import cv2
     except ImportError as error:

@@ -32,6 +32,8 @@ class FeatureKind(StrEnum):
 DESCRIPTOR_BYTES: dict[FeatureKind, int] = {FeatureKind.ROOTSIFT: 128, FeatureKind.ORB: 32}
 # RootSIFT descriptors have unit length; in bytes 512 stands for 1, and what saturates at 255 is rare.
 ROOTSIFT_SCALE = 512.0
+MAX_FEATURES = 20_000
+MAX_THUMBNAIL_BYTES = 64 * 1024
 
 
 class Distortion(BaseModel):
@@ -161,6 +163,13 @@ def quantise_rootsift(descriptors: NDArray[np.generic]) -> NDArray[np.uint8]:
         raise ValueError("descriptors have numbers that are not finite")
     scaled: NDArray[np.uint8] = np.clip(np.rint(values * ROOTSIFT_SCALE), 0, 255).astype(np.uint8)
     return scaled
+
+
+def check_inside(keypoints_px: NDArray[np.float32], camera: Camera) -> None:
+    """Raise ValueError unless all points (n, 2) lie in the camera's image."""
+    high = np.array([camera.width, camera.height]) - 0.5
+    if not ((keypoints_px >= -0.5) & (keypoints_px <= high)).all():
+        raise ValueError(f"points outside of {camera.width} x {camera.height} px")
 
 
 def _check_numbers(name: str, values: tuple[float, ...], count: int) -> None:

@@ -100,6 +100,7 @@ class RobotReport(Report):
     camera: Camera | None
     boot: str | None = Field(description="The boot that it was last heard from.")
     keyframe: KeyframeId | None = Field(description="Its newest keyframe in use.")
+    heard: KeyframeId | None = Field(default=None, description="Its newest keyframe that arrived, usable or not.")
     last_seen: Time | None
     clock_offset_s: float | None = Field(description="Sensor time minus arrival time of its last message.")
     pose_correction: PoseCorrection | None

@@ -6,6 +6,7 @@ Scouting is off and end points are explicit; shared memory is off, since it bypa
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from typing import Literal
 
@@ -16,6 +17,21 @@ from covista_schemas.errors import LinkError
 MAX_MESSAGE_BYTES = 4 * 1024 * 1024
 # A dead link is noticed after some 1.6 s, not 10 s.
 LEASE_MS = 2000
+# How often a router that does not answer is tried: soon at first, once a second in the end.
+RETRY = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
+_INTERNET = re.compile(r"(?:tcp|udp|tls|quic|ws)/(?:\[[0-9a-fA-F:.]+\]|[^\s/:\[\]]+):(?P<port>\d{1,5})(?:[?#]\S*)?")
+_OTHER = re.compile(r"(?:unixsock-stream|unixpipe|serial|vsock)/\S+")
+
+
+def check_endpoint(endpoint: str) -> str:
+    """Return `endpoint` if it can be one, such as tcp/127.0.0.1:7447, else raise LinkError.
+
+    Zenoh finds out only when it opens a session, and cannot tell a bad end point from a router that is not there.
+    """
+    internet = _INTERNET.fullmatch(endpoint)
+    if _OTHER.fullmatch(endpoint) or (internet and int(internet["port"]) <= 65_535):
+        return endpoint
+    raise LinkError(f"{endpoint!r} is not an end point such as tcp/127.0.0.1:7447")
 
 
 def config(
@@ -27,14 +43,17 @@ def config(
 ) -> zenoh.Config:
     """Configuration of a session; `connect` and `listen` are end points such as tcp/127.0.0.1:7447.
 
-    A client that finds no router within `timeout_ms` fails to open. Raises LinkError for end points that zenoh refuses.
+    A client that finds no router within `timeout_ms` fails to open. Raises LinkError for end points that cannot be.
     """
+    for endpoint in (*connect, *listen):
+        check_endpoint(endpoint)
     made = zenoh.Config()
     values: dict[str, object] = {
         "mode": mode,
         "connect/endpoints": list(connect),
         "connect/timeout_ms": timeout_ms,
         "connect/exit_on_failure": mode == "client",
+        "connect/retry": RETRY,
         "listen/endpoints": list(listen),
         "listen/exit_on_failure": True,
         "scouting/multicast/enabled": False,

@@ -1,0 +1,166 @@
+"""A rover's half of the zenoh link: publishers, presence, its group, and the station's confirmation."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import zenoh
+import zenoh.ext
+from covista_schemas import codec, keys
+from covista_schemas.errors import LinkError
+from covista_schemas.reports import KeyframeId, OwnGroupReport, RobotReport
+from covista_schemas.zenoh_config import config
+from pydantic import ValidationError
+
+logger = logging.getLogger(__name__)
+
+# Long enough for a slow network, short enough for a rover that is closed while it still looks for a router.
+OPEN_TIMEOUT_MS = 1500
+_PAUSE_S = 0.1
+_ASK_EVERY_S = 0.03
+
+OnGroup = Callable[[OwnGroupReport], object]
+
+
+def open_with_retry(endpoint: str, stop: threading.Event) -> zenoh.Session | None:
+    """A session as client of the router at `endpoint`, as soon as there is one; None once `stop` is set."""
+    while not stop.is_set():
+        try:
+            return zenoh.open(config("client", connect=[endpoint], timeout_ms=OPEN_TIMEOUT_MS))
+        except zenoh.ZError as error:
+            logger.debug("no router at %s yet: %s", endpoint, error)
+        stop.wait(_PAUSE_S)
+    return None
+
+
+class RoverLink:
+    """What one robot declares on a session; with `owned`, closing closes the session too."""
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        site: str,
+        robot: str,
+        boot: str,
+        *,
+        owned: bool,
+        token: bool,
+        wake: Callable[[], None],
+    ) -> None:
+        self._session = session
+        self._site, self._robot, self._boot = site, robot, boot
+        self._owned = owned
+        # Keyframes give way to poses, and a congested link drops them at the source instead of holding up the robot.
+        self._keyframes = session.declare_publisher(
+            keys.keyframe(site, robot),
+            encoding=codec.KEYFRAME_ENCODING,
+            congestion_control=zenoh.CongestionControl.BLOCK_FIRST,
+            priority=zenoh.Priority.DATA_LOW,
+        )
+        self._poses = session.declare_publisher(
+            keys.pose(site, robot),
+            encoding=codec.POSE_ENCODING,
+            congestion_control=zenoh.CongestionControl.DROP,
+            priority=zenoh.Priority.INTERACTIVE_HIGH,
+            express=True,
+        )
+        self._declared: list[zenoh.LivelinessToken | zenoh.MatchingListener[None] | zenoh.ext.AdvancedSubscriber[None]]
+        self._declared = [pub.declare_matching_listener(lambda _: wake()) for pub in (self._keyframes, self._poses)]
+        if token:
+            self._declared.append(session.liveliness().declare_token(keys.alive(site, robot, boot)))
+
+    def keyframes_wanted(self) -> bool:
+        """Whether a station listens to keyframes right now: what is put without one is lost without a word."""
+        return _has_listeners(self._keyframes)
+
+    def poses_wanted(self) -> bool:
+        """Whether a station listens to poses right now."""
+        return _has_listeners(self._poses)
+
+    def put_pose(self, data: bytes) -> None:
+        """Send a pose, or drop it where the link is congested."""
+        self._poses.put(data)
+
+    def put_keyframe(self, data: bytes) -> None:
+        """Send a keyframe, or drop it where the link is congested for long."""
+        self._keyframes.put(data)
+
+    def put_last_keyframe(self, data: bytes) -> None:
+        """Send a keyframe that nothing follows: waits for a congested link instead of dropping."""
+        self._session.put(
+            keys.keyframe(self._site, self._robot),
+            data,
+            encoding=codec.KEYFRAME_ENCODING,
+            congestion_control=zenoh.CongestionControl.BLOCK,
+            priority=zenoh.Priority.DATA_LOW,
+        )
+
+    def follow_group(self, callback: OnGroup) -> None:
+        """Call `callback` with the robot's group, the present one first, from a thread of zenoh's."""
+        # Late publishers too: a station that starts after the rover says where the rover stands.
+        self._declared.append(
+            zenoh.ext.declare_advanced_subscriber(
+                self._session,
+                keys.own_group(self._site, self._robot),
+                lambda sample: _tell(callback, sample.payload.to_bytes()),
+                history=zenoh.ext.HistoryConfig(detect_late_publishers=True),
+            )
+        )
+
+    def report(self, timeout_s: float) -> RobotReport | None:
+        """What the station knows of this robot, or None where it does not answer."""
+        return ask_report(self._session, self._site, self._robot, timeout_s)
+
+    def confirm(self, last: int, deadline_s: float) -> bool:
+        """Wait until the station has heard of keyframe `last` of this boot; False after `deadline_s` (monotonic)."""
+        pause = threading.Event()
+        while (left_s := deadline_s - time.monotonic()) > 0:
+            report = self.report(left_s)
+            if report is not None and has_heard(report, KeyframeId(boot=self._boot, sequence=last)):
+                return True
+            pause.wait(min(_ASK_EVERY_S, left_s))
+        return False
+
+    def close(self) -> None:
+        """Take everything back."""
+        for declared in reversed(self._declared):
+            declared.undeclare()
+        self._keyframes.undeclare()
+        self._poses.undeclare()
+        if self._owned:
+            self._session.close()
+
+
+def _has_listeners(publisher: zenoh.Publisher) -> bool:
+    # The stubs of zenoh call it a bool; it is an object that is always true.
+    status: Any = publisher.matching_status
+    return bool(status.matching)
+
+
+def ask_report(session: zenoh.Session, site: str, robot: str, timeout_s: float) -> RobotReport | None:
+    """What the station knows of `robot`, or None where it does not answer (in time), or does not know it."""
+    for reply in session.get(keys.robot_report(site, robot), timeout=timeout_s):
+        if reply.ok is not None:
+            try:
+                return RobotReport.model_validate_json(reply.ok.payload.to_bytes())
+            except ValidationError as error:
+                raise LinkError(f"the station's report on {robot} cannot be read: {error}") from error
+    return None
+
+
+def has_heard(report: RobotReport, keyframe: KeyframeId) -> bool:
+    """Whether the station has received this keyframe or a later one of the same boot, usable or not."""
+    known = (report.heard, report.keyframe)
+    return any(k is not None and k.boot == keyframe.boot and k.sequence >= keyframe.sequence for k in known)
+
+
+def _tell(callback: OnGroup, data: bytes) -> None:
+    try:
+        callback(OwnGroupReport.model_validate_json(data))
+    except Exception:
+        # Whatever the rover's own code raises must not end the subscription.
+        logger.exception("a callback of on_group failed")

@@ -1,0 +1,208 @@
+"""A robot that tells the station what it sees."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+import uuid
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+import zenoh
+from covista_schemas import codec, keys
+from covista_schemas.errors import LinkError
+from covista_schemas.messages import Camera, Keyframe, Pose, PoseUpdate
+from covista_schemas.reports import KeyframeId
+from covista_schemas.zenoh_config import check_endpoint
+
+from covista_clients.rover.content import Content, Image, Send, prepare
+from covista_clients.rover.link import OnGroup, RoverLink, open_with_retry
+from covista_clients.rover.outbox import Outbox
+
+logger = logging.getLogger(__name__)
+
+CLOSE_TIMEOUT_S = 2.0
+
+
+class Rover:
+    """Sends poses and keyframes of one camera to a station, and hears which group the robot is in.
+
+    Connects in the background and for as long as it takes; until a station listens, the newest keyframe and the newest
+    pose are kept. Close it, or use it as a context manager: closing waits until the station has confirmed the last
+    keyframe, at most two seconds. Safe to use from several threads; not from inside an `on_group` callback, where only
+    `send_pose` and `send_keyframe` may be called.
+    """
+
+    def __init__(
+        self,
+        robot: str,
+        camera: Camera,
+        connect: str = "tcp/127.0.0.1:7447",
+        *,
+        site: str = "default",
+        send: Send | str = Send.IMAGE,
+        session: zenoh.Session | None = None,
+        boot: str | None = None,
+        liveliness: bool = True,
+    ) -> None:
+        """`send` says what becomes of pictures: image (JPEG), features, or features+thumbnail.
+
+        With `session` the rover speaks over an open session, which stays open. Raises ValueError for ids that are
+        none, and LinkError for an end point that cannot be one.
+        """
+        self.robot, self.site = keys.check_id(robot, "robot"), keys.check_id(site, "site")
+        self.boot = keys.check_id(boot, "boot") if boot is not None else uuid.uuid4().hex
+        self.camera = camera
+        self.send = _checked_send(send)
+        self.keyframes_sent = 0
+        self.poses_sent = 0
+        self._last_sent: int | None = None
+        self._connect = connect if session is not None else check_endpoint(connect)
+        self._token = liveliness
+        self._outbox: Outbox[tuple[Pose, Callable[[], Content]]] = Outbox()
+        self._stop = threading.Event()
+        self._closing = False
+        self._pose_news = threading.Condition()
+        self._held_pose: Pose | None = None
+        self._link_lock = threading.Lock()
+        self._link: RoverLink | None = None
+        self._callbacks: list[OnGroup] = []
+        if session is not None:
+            self._attach(session, owned=False)
+        # A daemon: a rover that was never closed does not keep its program from ending.
+        self._sender = threading.Thread(target=self._work, name=f"rover-{robot}", daemon=True)
+        self._sender.start()
+
+    @property
+    def replaced(self) -> int:
+        """Keyframes that gave way to newer ones before they were sent."""
+        return self._outbox.replaced
+
+    def send_pose(self, pose: Pose) -> None:
+        """Send where the camera is; kept, until a newer one comes, while no station listens."""
+        self._check_open()
+        with self._pose_news:
+            self._held_pose = _checked_pose(pose)
+            self._flush_pose()
+
+    def send_keyframe(self, image: Image, pose: Pose, thumbnail: bytes | None = None) -> KeyframeId:
+        """Hand over a picture, (H, W) grey or (H, W, 3) BGR uint8, JPEG, PNG or WebP bytes, or Features, with its pose.
+
+        Returns at once with the id that the keyframe goes out under; if a newer one replaces it before, that one bears
+        the id. Raises ValueError that names what does not fit.
+        """
+        self._check_open()
+        work = prepare(image, self.camera, self.send, thumbnail)
+        sequence = self._outbox.offer((_checked_pose(pose), work))
+        return KeyframeId(boot=self.boot, sequence=sequence)
+
+    def on_group(self, callback: OnGroup) -> None:
+        """Call `callback` with an OwnGroupReport: soon with the present one, and whenever the robot's group changes."""
+        self._check_open()
+        with self._link_lock:
+            self._callbacks.append(callback)
+            if self._link is not None:
+                self._link.follow_group(callback)
+
+    def close(self) -> None:
+        """Send what still waits, wait for the station's confirmation (at most 2 s in all), and leave."""
+        with self._link_lock:
+            if self._closing:
+                return
+            self._closing = True
+        deadline_s = time.monotonic() + CLOSE_TIMEOUT_S
+        try:
+            if not (self._drain(deadline_s) and self._confirm(deadline_s)):
+                logger.warning("%s leaves without the station's confirmation of all it had to say", self.robot)
+        finally:
+            self._stop.set()
+            self._outbox.close()
+            self._sender.join()
+            if self._link is not None:
+                self._link.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _check_open(self) -> None:
+        if self._closing:
+            raise LinkError(f"rover {self.robot} is closed")
+
+    def _attach(self, session: zenoh.Session, *, owned: bool) -> None:
+        with self._link_lock:
+            self._link = RoverLink(
+                session, self.site, self.robot, self.boot, owned=owned, token=self._token, wake=self._outbox.wake
+            )
+            for callback in self._callbacks:
+                self._link.follow_group(callback)
+
+    def _work(self) -> None:
+        """The rover's own thread: connect, then encode and send until closed."""
+        if self._link is None:
+            session = open_with_retry(self._connect, self._stop)
+            if session is None:
+                return
+            self._attach(session, owned=True)
+        link = self._link
+        while link is not None and not self._outbox.closed:
+            with self._pose_news:
+                self._flush_pose()
+            taken = self._outbox.take(link.keyframes_wanted)
+            if taken is not None:
+                self._send_keyframe(link, *taken)
+
+    def _send_keyframe(self, link: RoverLink, sequence: int, item: tuple[Pose, Callable[[], Content]]) -> None:
+        pose, work = item
+        try:
+            content = work()
+            keyframe = Keyframe(
+                self.robot, self.boot, sequence, self.camera, pose, content.image, content.features, content.thumbnail
+            )
+            put = link.put_last_keyframe if self._closing else link.put_keyframe
+            put(codec.encode_keyframe(keyframe))
+        except Exception:
+            # One picture that OpenCV or the link refuses must not silence the rover.
+            logger.exception("%s could not send keyframe %d", self.robot, sequence)
+        else:
+            self.keyframes_sent += 1
+            self._last_sent = sequence
+
+    def _flush_pose(self) -> None:
+        """Send the pose that waits, if a station listens; call with `_pose_news` held."""
+        if self._held_pose is None or self._link is None or not self._link.poses_wanted():
+            return
+        update = PoseUpdate(self.robot, self.boot, self.poses_sent, self._held_pose)
+        self._link.put_pose(codec.encode_pose(update))
+        self.poses_sent += 1
+        self._held_pose = None
+        self._pose_news.notify_all()
+
+    def _drain(self, deadline_s: float) -> bool:
+        with self._pose_news:
+            said = self._pose_news.wait_for(lambda: self._held_pose is None, deadline_s - time.monotonic())
+        return self._outbox.drain(deadline_s - time.monotonic()) and said
+
+    def _confirm(self, deadline_s: float) -> bool:
+        if self._last_sent is None or self._link is None:
+            return True
+        return self._link.confirm(self._last_sent, deadline_s)
+
+
+def _checked_send(send: Send | str) -> Send:
+    try:
+        return Send(send)
+    except ValueError:
+        raise ValueError(f"send: {send!r}, not one of {', '.join(Send)}") from None
+
+
+def _checked_pose(pose: Pose) -> Pose:
+    if not isinstance(pose, Pose):
+        raise ValueError(f"pose: a Pose, not {type(pose).__name__}")
+    return pose
