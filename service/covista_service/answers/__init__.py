@@ -1,0 +1,29 @@
+"""A snapshot of the station as reports: what REST and zenoh both answer with."""
+
+from covista_service.answers.grouping import (
+    event_report,
+    group_report,
+    groups_report,
+    own_group_report,
+    similarity_report,
+)
+from covista_service.answers.pairs import explaining_survey, find_pair, pair_report, pairs_report
+from covista_service.answers.robots import find_robot, robot_report, robots_report
+from covista_service.answers.unknown import NotKnownError, problem_of
+
+__all__ = [
+    "NotKnownError",
+    "event_report",
+    "explaining_survey",
+    "find_pair",
+    "find_robot",
+    "group_report",
+    "groups_report",
+    "own_group_report",
+    "pair_report",
+    "pairs_report",
+    "problem_of",
+    "robot_report",
+    "robots_report",
+    "similarity_report",
+]

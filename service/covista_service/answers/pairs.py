@@ -1,0 +1,120 @@
+"""Pairs of robots as reports, and the survey that explains one."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from covista_schemas import reports
+
+from covista_service.answers.robots import find_robot, keyframe_id
+from covista_service.answers.unknown import NotKnownError
+from covista_service.perception.camera import Floats, Pose
+from covista_service.perception.survey import Outcome, Plane, Survey
+from covista_service.station.events import Keyframe
+from covista_service.station.snapshot import PairView, Snapshot
+
+# Hundredths of a pixel are finer than any camera's model.
+_DECIMALS_PX = 2
+
+
+def pairs_report(snapshot: Snapshot, robot: str | None = None, min_overlap: float | None = None) -> reports.PairsReport:
+    """All pairs, or those of one robot, or those where one sees at least this share of the other's image."""
+    if robot is None:
+        views = list(snapshot.pairs())
+    else:
+        find_robot(snapshot, robot)
+        views = [snapshot.pair(robot, other) for other in snapshot.robots if other != robot]
+    least = min_overlap or 0.0
+    seen = [view for view in views if max(view.overlap_a or 0.0, view.overlap_b or 0.0) >= least]
+    return reports.PairsReport(pairs=[reports.PairSummary.model_validate(_pair(view, "a")) for view in seen])
+
+
+def find_pair(snapshot: Snapshot, a: str, b: str) -> PairView:
+    """A pair of two robots, in the station's order. Raises NotKnownError."""
+    find_robot(snapshot, a)
+    find_robot(snapshot, b)
+    if a == b:
+        raise NotKnownError("Unknown pair", f"{a!r} makes no pair with itself")
+    return snapshot.pair(a, b)
+
+
+def pair_report(snapshot: Snapshot, a: str, b: str) -> reports.PairReport:
+    """A pair in the order asked for. Raises NotKnownError."""
+    view = find_pair(snapshot, a, b)
+    first: Literal["a", "b"] = "a" if view.a == a else "b"
+    planes = _planes(view)
+    if first == "b":
+        planes = [
+            plane.model_copy(update={"polygon_a": plane.polygon_b, "polygon_b": plane.polygon_a}) for plane in planes
+        ]
+    return reports.PairReport(
+        **_pair(view, first),
+        regions_a=[plane.polygon_a for plane in planes if plane.polygon_a],
+        regions_b=[plane.polygon_b for plane in planes if plane.polygon_b],
+        planes=planes,
+    )
+
+
+def explaining_survey(view: PairView) -> Survey | None:
+    """The survey that a pair's overlaps were read from, if they were."""
+    if view.survey is None or view.survey.outcome is not Outcome.MEASURED or view.keyframe_a is None:
+        return None
+    return view.survey
+
+
+def _pair(view: PairView, first: Literal["a", "b"]) -> dict[str, object]:
+    """The fields of a summary, with the robot that is to come first as `a`."""
+    sides = [(view.a, view.overlap_a, view.keyframe_a), (view.b, view.overlap_b, view.keyframe_b)]
+    (a, overlap_a, keyframe_a), (b, overlap_b, keyframe_b) = sides if first == "a" else reversed(sides)
+    return {
+        "a": a,
+        "b": b,
+        "overlap_a": overlap_a,
+        "overlap_b": overlap_b,
+        "found_by": view.found_by,
+        "outcome": view.outcome,
+        "inliers": view.inliers,
+        "pose_source": _pose_source(view),
+        "age_s": view.age_s,
+        "keyframes": _keyframes(keyframe_a, keyframe_b),
+    }
+
+
+def _pose_source(view: PairView) -> Literal["reported", "images"] | None:
+    if view.found_by is reports.FoundBy.UNKNOWN:
+        return None
+    survey = explaining_survey(view)
+    return "reported" if survey is None else survey.pose_source
+
+
+def _keyframes(a: Keyframe | None, b: Keyframe | None) -> reports.PairKeyframes | None:
+    return reports.PairKeyframes(a=keyframe_id(a.id), b=keyframe_id(b.id)) if a and b else None
+
+
+def _planes(view: PairView) -> list[reports.PlaneReport]:
+    survey = explaining_survey(view)
+    if survey is None or view.keyframe_a is None:
+        return []
+    return [_plane(plane, view.keyframe_a.pose) for plane in survey.planes]
+
+
+def _plane(plane: Plane, pose: Pose) -> reports.PlaneReport:
+    """A plane in the world frame.
+
+    u . X + 1 = 0 with X = R' (X_world - c) of the first camera is (R u) . X_world + 1 - (R u) . c = 0.
+    """
+    turned = pose.world_from_camera @ plane.normal
+    length = float(np.linalg.norm(turned))
+    x, y, z = (float(value) for value in turned / length)
+    return reports.PlaneReport(
+        normal=(x, y, z),
+        offset_m=(1.0 - float(turned @ pose.centre_m)) / length,
+        support=plane.support,
+        polygon_a=_polygon(plane.region_first),
+        polygon_b=_polygon(plane.region_second),
+    )
+
+
+def _polygon(points_px: Floats) -> reports.Polygon:
+    return [(x, y) for x, y in np.round(points_px, _DECIMALS_PX).tolist()]

@@ -1,0 +1,173 @@
+"""The settings of the station: flags > environment (COVISTA_*) > file (TOML) > defaults."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Literal, NamedTuple, Self
+
+from covista_schemas.errors import CovistaError
+from covista_schemas.keys import ID_PATTERN
+from covista_schemas.reports import LiveSettings
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, model_validator
+from pydantic_settings import BaseSettings, InitSettingsSource, NoDecode, PydanticBaseSettingsSource, SettingsConfigDict
+from sqlalchemy.engine import make_url
+from sqlalchemy.exc import ArgumentError
+
+PREFIX = "COVISTA_"
+# Settings that are flags of `serve` too.
+FLAGS = ("api", "link", "connect", "database", "workers", "insecure")
+_PROTOCOLS = ("tcp", "tls", "quic", "ws", "udp", "unixsock-stream")
+
+
+class SettingsError(CovistaError):
+    """Settings that make no sense; the text is one line that names the setting and what is allowed."""
+
+
+class Address(NamedTuple):
+    """Where to listen."""
+
+    host: str
+    port: int
+
+
+def parse_address(text: str) -> Address:
+    """HOST:PORT or [IPv6]:PORT as an Address; raises ValueError."""
+    host, colon, port = text.rpartition(":")
+    if not (colon and host and port.isascii() and port.isdigit() and int(port) < 65_536):
+        raise ValueError(f"{text!r} is not HOST:PORT with a port from 0 to 65535")
+    return Address(host.removeprefix("[").removesuffix("]"), int(port))
+
+
+def _check_address(text: str) -> str:
+    parse_address(text)
+    return text
+
+
+def _check_endpoint(text: str) -> str:
+    protocol, slash, rest = text.partition("/")
+    if protocol not in _PROTOCOLS or not slash or not rest:
+        raise ValueError(f"{text!r} is not an end point such as tcp/127.0.0.1:7447; protocols: {', '.join(_PROTOCOLS)}")
+    if protocol != "unixsock-stream":
+        parse_address(rest.split("?")[0].split("#")[0])
+    return text
+
+
+def _check_database(text: str) -> str:
+    try:
+        make_url(text)
+    except ArgumentError as error:
+        raise ValueError("not a database URL such as sqlite:///covista.db") from error
+    return text
+
+
+def _split(value: object) -> object:
+    return [part.strip() for part in value.split(",") if part.strip()] if isinstance(value, str) else value
+
+
+Endpoints = Annotated[tuple[Annotated[str, AfterValidator(_check_endpoint)], ...], NoDecode, BeforeValidator(_split)]
+Seconds = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False)]
+
+
+class Settings(LiveSettings, BaseSettings):
+    """Everything that can be set, flat: the names are the keys of the TOML file and, with COVISTA_, the variables."""
+
+    model_config = SettingsConfigDict(
+        env_prefix=PREFIX, extra="forbid", frozen=True, env_ignore_empty=True, hide_input_in_errors=True
+    )
+
+    api: Annotated[str, AfterValidator(_check_address)] = Field(
+        default="127.0.0.1:8000", description="HOST:PORT that the REST interface listens on; port 0 takes a free one."
+    )
+    link: Endpoints = Field(
+        default=("tcp/127.0.0.1:7447",), description="zenoh end points to listen on, separated by commas."
+    )
+    connect: Endpoints = Field(default=(), description="zenoh routers to join, separated by commas.")
+    site: str = Field(default="default", pattern=f"^{ID_PATTERN}$", description="Second chunk of every key expression.")
+    database: Annotated[str, AfterValidator(_check_database)] = Field(
+        default="sqlite:///covista.db", description="URL of the database for the history."
+    )
+    workers: Literal["threads", "processes"] = Field(default="threads", description="Where surveys run.")
+    workers_count: int = Field(default=2, ge=1, le=256, description="How many surveys run at a time.")
+    insecure: bool = Field(default=False, description="Listen beyond loopback without access control.")
+    log_level: Literal["debug", "info", "warning", "error"] = Field(default="info", description="Least level to log.")
+    live_after_s: Seconds = Field(default=5, description="A robot is live so long after its last message.")
+    gone_after_s: Seconds = Field(default=30, description="A stale robot is gone after so much more silence.")
+    forget_after_s: Seconds = Field(default=600, description="A robot is forgotten after this silence.")
+    decay_after_s: Seconds = Field(default=60, description="An overlap decays when it is older than this.")
+    unknown_after_s: Seconds = Field(default=600, description="An overlap is unknown when it is older than this.")
+    retry_after_s: Seconds = Field(default=30, description="Every possible pair is tried once in so long.")
+
+    @property
+    def api_address(self) -> Address:
+        """Where the REST interface listens."""
+        return parse_address(self.api)
+
+    @property
+    def live(self) -> LiveSettings:
+        """Those settings that can change while the station runs."""
+        return LiveSettings.model_validate({name: getattr(self, name) for name in LiveSettings.model_fields})
+
+    @model_validator(mode="after")
+    def _check_order(self) -> Self:
+        if self.decay_after_s > self.unknown_after_s:
+            raise ValueError(
+                f"setting decay_after_s = {self.decay_after_s:g} must not be more than "
+                f"unknown_after_s = {self.unknown_after_s:g}"
+            )
+        if self.live_after_s + self.gone_after_s > self.forget_after_s:
+            raise ValueError(
+                f"setting forget_after_s = {self.forget_after_s:g} must not be less than live_after_s + gone_after_s "
+                f"= {self.live_after_s + self.gone_after_s:g}"
+            )
+        if not self.link and not self.connect:
+            raise ValueError("setting link is empty, and so is connect: no robot could reach the station")
+        return self
+
+
+def load(flags: Mapping[str, object] | None = None, file: Path | None = None) -> Settings:
+    """Settings from `flags`, the environment and a TOML `file`. Raises SettingsError."""
+    stored = _read(file) if file else {}
+
+    class Layered(Settings):
+        @classmethod
+        def settings_customise_sources(
+            cls,
+            settings_cls: type[BaseSettings],
+            init_settings: PydanticBaseSettingsSource,
+            env_settings: PydanticBaseSettingsSource,
+            dotenv_settings: PydanticBaseSettingsSource,  # noqa: ARG003 - pydantic-settings passes it by name
+            file_secret_settings: PydanticBaseSettingsSource,  # noqa: ARG003 - pydantic-settings passes it by name
+        ) -> tuple[PydanticBaseSettingsSource, ...]:
+            return init_settings, env_settings, InitSettingsSource(settings_cls, stored)
+
+    try:
+        layered = Layered.model_validate(dict(flags or {}))
+    except ValidationError as error:
+        raise SettingsError(_one_line(error)) from error
+    # A class that every process can import, for settings that travel to one.
+    return Settings.model_construct(**dict(layered))
+
+
+def _read(file: Path) -> dict[str, object]:
+    try:
+        return tomllib.loads(file.read_text("utf-8"))
+    except OSError as error:
+        raise SettingsError(f"--config {file} cannot be read: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise SettingsError(f"--config {file} is not TOML: {error}") from error
+
+
+def _one_line(error: ValidationError) -> str:
+    """The first wrong setting, what is wrong with it, and what is allowed."""
+    found = error.errors(include_url=False)
+    if not found[0]["loc"]:
+        return found[0]["msg"].removeprefix("Value error, ")
+    name = str(found[0]["loc"][0])
+    known = Settings.model_fields
+    if name not in known:
+        return f"setting {name} is not known; known are {', '.join(known)}"
+    reasons = dict.fromkeys(each["msg"].removeprefix("Value error, ") for each in found if each["loc"][0] == name)
+    flag = f"--{name}, " if name in FLAGS else ""
+    return f"setting {name} ({flag}{PREFIX}{name.upper()}): {'; or '.join(reasons)}. {known[name].description}"

@@ -1,0 +1,103 @@
+"""What the station tells over zenoh: the groups, each robot's own group, and events.
+
+The last value of each key is kept for advanced subscribers that come late. A thread of its own puts, so that a slow
+peer costs the loop nothing; where it cannot keep up, only the newest value of a key goes out.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import deque
+
+import zenoh
+from covista_schemas import keys
+from covista_schemas.reports import EventReport
+from zenoh import ext
+
+from covista_service import answers
+from covista_service.loop import News
+from covista_service.station.snapshot import Snapshot
+
+MAX_EVENTS = 1000
+
+log = logging.getLogger(__name__)
+
+
+class Publisher:
+    """A sink of the loop's news."""
+
+    def __init__(self, session: zenoh.Session, site: str) -> None:
+        self._session = session
+        self._site = site
+        self._changed = threading.Condition()
+        self._events: deque[EventReport] = deque(maxlen=MAX_EVENTS)
+        self._robots: dict[str, None] = {}
+        self._snapshot: Snapshot | None = None
+        self._closing = False
+        self._publishers: dict[str, ext.AdvancedPublisher] = {}
+        self._thread = threading.Thread(target=self._run, name="covista-publish")
+        self._thread.start()
+
+    def take(self, news: News) -> None:
+        """Publish this soon."""
+        with self._changed:
+            self._events.extend(news.events)
+            if news.groups_changed:
+                self._snapshot = news.snapshot
+                self._robots.update(dict.fromkeys(news.robots))
+            self._changed.notify()
+
+    def close(self) -> None:
+        """Publish what is waiting, then end."""
+        with self._changed:
+            self._closing = True
+            self._changed.notify()
+        self._thread.join()
+        for publisher in self._publishers.values():
+            publisher.undeclare()
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._closing or self._events or self._snapshot)
+                if not self._events and self._snapshot is None:
+                    return
+                snapshot, robots, events = self._snapshot, tuple(self._robots), tuple(self._events)
+                self._snapshot = None
+                self._robots.clear()
+                self._events.clear()
+            try:
+                self._publish(snapshot, robots, events)
+            except zenoh.ZError as error:
+                log.warning("cannot publish: %s", error)
+
+    def _publish(self, snapshot: Snapshot | None, robots: tuple[str, ...], events: tuple[EventReport, ...]) -> None:
+        if snapshot is not None:
+            self._put(keys.groups(self._site), answers.groups_report(snapshot).model_dump_json())
+            for robot in robots:
+                self._put(
+                    keys.own_group(self._site, robot), answers.own_group_report(snapshot, robot).model_dump_json()
+                )
+            self._forget(snapshot)
+        for event in events:
+            self._put(keys.events(self._site), event.model_dump_json())
+
+    def _put(self, key: str, text: str) -> None:
+        if key not in self._publishers:
+            self._publishers[key] = ext.declare_advanced_publisher(
+                self._session,
+                key,
+                cache=ext.CacheConfig(1),
+                publisher_detection=True,
+                encoding=zenoh.Encoding.APPLICATION_JSON,
+                congestion_control=zenoh.CongestionControl.BLOCK,
+            )
+        self._publishers[key].put(text)
+
+    def _forget(self, snapshot: Snapshot) -> None:
+        """Robots that are forgotten need no publisher any more."""
+        standing = {keys.own_group(self._site, robot) for robot in snapshot.robots}
+        standing |= {keys.groups(self._site), keys.events(self._site)}
+        for key in self._publishers.keys() - standing:
+            self._publishers.pop(key).undeclare()

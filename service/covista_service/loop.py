@@ -1,0 +1,242 @@
+"""The one task that owns the station: draws events from a source, sends jobs to workers and news to sinks."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import logging
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
+from covista_schemas.errors import DecodeError
+from covista_schemas.reports import EventReport
+
+from covista_service.answers import event_report
+from covista_service.perception.camera import Features
+from covista_service.perception.survey import Survey
+from covista_service.station.events import (
+    Effect,
+    Event,
+    ExtractFeatures,
+    FeaturesExtracted,
+    GroupsChanged,
+    GroupsEvaluated,
+    Happened,
+    Keyframe,
+    MessageDropped,
+    MessagesReceived,
+    SurveyDone,
+    SurveyPair,
+    Tick,
+)
+from covista_service.station.snapshot import Snapshot
+from covista_service.station.station import Station
+from covista_service.telemetry import Telemetry
+
+TICK_S = 0.25
+# Mail of so many robots is opened before workers' results and other tasks get their turn.
+BATCH = 32
+WORKER_FAILED = "worker_failed"
+_NS_PER_S = 1e9
+_T = TypeVar("_T")
+
+log = logging.getLogger(__name__)
+
+
+class Source(Protocol):
+    """Where events come from."""
+
+    def attach(self, wake: Callable[[], None]) -> None:
+        """Say whom to wake, from any thread, when there are events."""
+
+    def drain(self, limit: int) -> tuple[Iterable[Event], bool]:
+        """Events of up to `limit` robots, and whether there are more."""
+
+
+class Crew(Protocol):
+    """Who does the heavy work."""
+
+    def extract(self, keyframe: Keyframe) -> Future[Features]:
+        """Decode the keyframe's image and extract its features."""
+
+    def survey(self, job: SurveyPair) -> Future[Survey]:
+        """Survey a pair."""
+
+
+@dataclass(frozen=True, slots=True)
+class News:
+    """What the world should hear of: what happened, and whether a new revision of the groups stands.
+
+    `robots` are those whose own group is not what they were told last.
+    """
+
+    snapshot: Snapshot
+    events: tuple[EventReport, ...]
+    groups_changed: bool
+    robots: tuple[str, ...]
+
+
+class Sink(Protocol):
+    """Who tells the world; returns at once."""
+
+    def take(self, news: News) -> None:
+        """Tell, later and elsewhere."""
+
+
+class Loop:
+    """Owns the station. `run` is the task; `snapshot` is for its thread, `ask` for all others."""
+
+    def __init__(
+        self,
+        station: Station,
+        source: Source,
+        crew: Crew,
+        sinks: Sequence[Sink],
+        telemetry: Telemetry,
+        *,
+        next_event: int = 1,
+        clock: Callable[[], int] = time.time_ns,
+    ) -> None:
+        self._station = station
+        self._source = source
+        self._crew = crew
+        self._sinks = sinks
+        self._telemetry = telemetry
+        self._event_ids = itertools.count(next_event)
+        self._clock = clock
+        self._results: deque[Event] = deque()
+        self._awake = asyncio.Event()
+        self._asyncio: asyncio.AbstractEventLoop | None = None
+        self._turned_ns = 0
+
+    async def run(self) -> None:
+        """Turn until cancelled: when there is something to do, and every quarter of a second."""
+        self._asyncio = asyncio.get_running_loop()
+        self._source.attach(self.wake)
+        while True:
+            try:
+                async with asyncio.timeout(TICK_S):
+                    await self._awake.wait()
+            except TimeoutError:
+                pass
+            self._awake.clear()
+            if self.turn():
+                self._awake.set()
+            await asyncio.sleep(0)
+
+    def turn(self) -> bool:
+        """Take in one batch and act on it; True if there is more to take in."""
+        events, more = self._source.drain(BATCH)
+        effects: list[Effect] = []
+        results = [self._results.popleft() for _ in range(len(self._results))]
+        for event in itertools.chain(results, events, (Tick(),)):
+            effects += self._receive(event)
+        self._tell(effects)
+        self._turned_ns = self._clock()
+        return more or bool(self._results)
+
+    def wake(self) -> None:
+        """Have a turn soon; from any thread, at any time."""
+        if self._asyncio is not None:
+            try:
+                self._asyncio.call_soon_threadsafe(self._awake.set)
+            except RuntimeError:
+                log.debug("woken after the end")
+
+    def snapshot(self) -> Snapshot:
+        """The station as it is; only in the loop's own thread."""
+        return self._station.snapshot(self._clock())
+
+    def ask(self, timeout_s: float = 1.0) -> Snapshot:
+        """The station as it is, for other threads. Raises TimeoutError, also when the loop is not running."""
+        answer: Future[Snapshot] = Future()
+        try:
+            if self._asyncio is not None:
+                self._asyncio.call_soon_threadsafe(lambda: answer.set_result(self.snapshot()))
+        except RuntimeError as error:
+            raise TimeoutError("the station has ended") from error
+        return answer.result(timeout_s)
+
+    def silent_s(self) -> float:
+        """Seconds since the last turn."""
+        return (self._clock() - self._turned_ns) / _NS_PER_S
+
+    def _receive(self, event: Event) -> Sequence[Effect]:
+        match event:
+            case MessagesReceived():
+                self._telemetry.received(event.topic, len(event.sequences))
+            case MessageDropped(counted=False):
+                self._telemetry.received(event.topic, event.count)
+            case FeaturesExtracted():
+                self._telemetry.ended()
+            case SurveyDone():
+                self._telemetry.ended()
+                self._telemetry.surveyed(event.survey.outcome if event.survey else WORKER_FAILED)
+        try:
+            effects = self._station.receive(event, self._clock())
+        except Exception:
+            # A bug that one robot's message brings to light must not silence the swarm.
+            self._telemetry.fault("station")
+            log.exception("the station failed on %s; going on", type(event).__name__)
+            return ()
+        for effect in effects:
+            self._act(effect)
+        return effects
+
+    def _act(self, effect: Effect) -> None:
+        match effect:
+            case ExtractFeatures(keyframe):
+                self._start(self._crew.extract(keyframe), lambda done: _extracted(keyframe, done))
+            case SurveyPair():
+                self._start(self._crew.survey(effect), lambda done: _surveyed(effect, done))
+            case GroupsEvaluated(keyframes):
+                now_ns = self._clock()
+                for _, arrived_ns in keyframes:
+                    self._telemetry.grouped((now_ns - arrived_ns) / _NS_PER_S)
+
+    def _start(self, job: Future[_T], event_of: Callable[[Future[_T]], Event]) -> None:
+        self._telemetry.started()
+        job.add_done_callback(lambda done: self._finish(done, event_of))
+
+    def _finish(self, done: Future[_T], event_of: Callable[[Future[_T]], Event]) -> None:
+        """Runs in a worker's thread."""
+        if not done.cancelled():
+            self._results.append(event_of(done))
+            self.wake()
+
+    def _tell(self, effects: Sequence[Effect]) -> None:
+        changes = [effect for effect in effects if isinstance(effect, GroupsChanged)]
+        happened = [effect for effect in effects if isinstance(effect, Happened)]
+        if not changes and not happened:
+            return
+        events = tuple(event_report(next(self._event_ids), each) for each in happened)
+        robots = tuple(dict.fromkeys(robot for change in changes for robot in change.robots))
+        news = News(self.snapshot(), events, bool(changes), robots)
+        for sink in self._sinks:
+            sink.take(news)
+
+
+def _extracted(keyframe: Keyframe, done: Future[Features]) -> FeaturesExtracted:
+    match done.exception():
+        case None:
+            return FeaturesExtracted(keyframe.id, done.result())
+        case DecodeError() as error:
+            return FeaturesExtracted(keyframe.id, None, error.code, str(error))
+        case failure:
+            return FeaturesExtracted(keyframe.id, None, WORKER_FAILED, _describe("extracting features", failure))
+
+
+def _surveyed(job: SurveyPair, done: Future[Survey]) -> SurveyDone:
+    failure = done.exception()
+    if failure is None:
+        return SurveyDone(job.first, job.second, done.result())
+    return SurveyDone(job.first, job.second, None, _describe("surveying a pair", failure))
+
+
+def _describe(what: str, failure: BaseException) -> str:
+    log.error("%s failed", what, exc_info=failure)
+    return f"{what} failed: {type(failure).__name__}: {failure}"

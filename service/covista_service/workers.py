@@ -1,0 +1,130 @@
+"""Where the heavy work runs: threads of this process, or processes of their own.
+
+OpenCV, BLAS and numba let go of the interpreter's lock while they compute, so threads do well; processes keep the rest
+of the station undisturbed, and survive a picture that crashes a decoder.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import threading
+from collections.abc import Callable
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import dataclass, field
+from multiprocessing import get_context, parent_process
+from typing import Literal, ParamSpec, TypeVar
+
+import cv2
+import numpy as np
+from covista_schemas import features as vision
+from covista_schemas.codec import BAD_IMAGE
+from covista_schemas.errors import DecodeError
+
+from covista_service.perception.camera import Features
+from covista_service.perception.survey import Survey, SurveyOptions, survey
+from covista_service.station.events import Keyframe, SurveyPair
+
+# A robot that shot while tilted says so in its pose, not by an orientation tag in the file.
+_AS_STORED = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class WorkersOptions:
+    """`count` jobs run at a time, each on one core."""
+
+    kind: Literal["threads", "processes"] = "threads"
+    count: int = 2
+    survey: SurveyOptions = field(default_factory=SurveyOptions)
+
+
+class Workers:
+    """A pool of workers. A pool whose process died is replaced when the next job comes."""
+
+    def __init__(self, options: WorkersOptions) -> None:
+        self._options = options
+        self._lock = threading.Lock()
+        self._pool = _pool(options)
+        # Processes take a second or two to start: now is better than when the first robot waits.
+        for _ in range(options.count):
+            self._submit(_use_one_core)
+
+    @property
+    def capacity(self) -> int:
+        """How many jobs can run at a time."""
+        return self._options.count
+
+    def extract(self, keyframe: Keyframe) -> Future[Features]:
+        """Decode the keyframe's image and extract its features; fails with DecodeError where it is no such image."""
+        if keyframe.image is None:
+            raise ValueError("a keyframe without an image has nothing to extract from")
+        return self._submit(extract, keyframe.image, keyframe.camera.width, keyframe.camera.height)
+
+    def survey(self, job: SurveyPair) -> Future[Survey]:
+        """Survey a pair."""
+        return self._submit(survey, job.first_view, job.second_view, self._options.survey, job.prior)
+
+    def close(self) -> None:
+        """Let jobs under way end, and drop those that wait."""
+        self._pool.shutdown(wait=True, cancel_futures=True)
+
+    def _submit(self, job: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> Future[_T]:
+        with self._lock:
+            try:
+                return self._pool.submit(job, *args, **kwargs)
+            except BrokenExecutor:
+                log.warning("a worker died; starting others")
+                self._pool.shutdown(wait=False)
+                self._pool = _pool(self._options)
+                return self._pool.submit(job, *args, **kwargs)
+            except RuntimeError:
+                # Closed: nobody waits for this job any more.
+                cancelled: Future[_T] = Future()
+                cancelled.cancel()
+                return cancelled
+
+
+def extract(image: bytes, width: int, height: int) -> Features:
+    """The features of an encoded picture of this size. Raises DecodeError."""
+    try:
+        picture = cv2.imdecode(np.frombuffer(image, np.uint8), _AS_STORED)
+    except cv2.error as error:
+        raise DecodeError(BAD_IMAGE, "image", f"cannot be decoded: {error.err}") from error
+    if picture is None:
+        raise DecodeError(BAD_IMAGE, "image", "cannot be decoded")
+    if picture.shape[:2] != (height, width):
+        raise DecodeError(
+            BAD_IMAGE, "image", f"{picture.shape[1]} x {picture.shape[0]} px, but the camera says {width} x {height}"
+        )
+    found = vision.extract(np.asarray(picture, np.uint8))
+    return Features(found.kind.value, found.keypoints_px, found.descriptors)
+
+
+def _pool(options: WorkersOptions) -> Executor:
+    if options.kind == "threads":
+        return ThreadPoolExecutor(options.count, "covista-worker", initializer=_use_one_core)
+    return ProcessPoolExecutor(options.count, get_context("spawn"), initializer=_enter_process)
+
+
+def _use_one_core() -> None:
+    """The cores are shared out by the pool: OpenCV must not take them all for one job."""
+    cv2.setNumThreads(1)
+
+
+def _enter_process() -> None:
+    """Leave Ctrl-C to the station, and end with it even when it is killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _use_one_core()
+    station = parent_process()
+    if station is not None:
+        threading.Thread(target=_follow, args=(station.join,), daemon=True).start()
+
+
+def _follow(wait: Callable[[], None]) -> None:
+    wait()
+    os._exit(1)
