@@ -68,10 +68,11 @@ class RoverLink:
             priority=zenoh.Priority.INTERACTIVE_HIGH,
             express=True,
         )
-        self._declared: list[zenoh.LivelinessToken | zenoh.MatchingListener[None] | zenoh.ext.AdvancedSubscriber[None]]
-        self._declared = [pub.declare_matching_listener(lambda _: wake()) for pub in (self._keyframes, self._poses)]
+        listeners = [pub.declare_matching_listener(lambda _: wake()) for pub in (self._keyframes, self._poses)]
+        self._undo: list[Callable[[], object]] = [self._keyframes.undeclare, self._poses.undeclare]
+        self._undo += [listener.undeclare for listener in listeners]
         if token:
-            self._declared.append(session.liveliness().declare_token(keys.alive(site, robot, boot)))
+            self._undo.append(session.liveliness().declare_token(keys.alive(site, robot, boot)).undeclare)
 
     def keyframes_wanted(self) -> bool:
         """Whether a station listens to keyframes right now: what is put without one is lost without a word."""
@@ -102,14 +103,13 @@ class RoverLink:
     def follow_group(self, callback: OnGroup) -> None:
         """Call `callback` with the robot's group, the present one first, from a thread of zenoh's."""
         # Late publishers too: a station that starts after the rover says where the rover stands.
-        self._declared.append(
-            zenoh.ext.declare_advanced_subscriber(
-                self._session,
-                keys.own_group(self._site, self._robot),
-                lambda sample: _tell(callback, sample.payload.to_bytes()),
-                history=zenoh.ext.HistoryConfig(detect_late_publishers=True),
-            )
+        subscriber = zenoh.ext.declare_advanced_subscriber(
+            self._session,
+            keys.own_group(self._site, self._robot),
+            lambda sample: _tell(callback, sample.payload.to_bytes()),
+            history=zenoh.ext.HistoryConfig(detect_late_publishers=True),
         )
+        self._undo.append(subscriber.undeclare)
 
     def report(self, timeout_s: float) -> RobotReport | None:
         """What the station knows of this robot, or None where it does not answer."""
@@ -127,10 +127,8 @@ class RoverLink:
 
     def close(self) -> None:
         """Take everything back."""
-        for declared in reversed(self._declared):
-            declared.undeclare()
-        self._keyframes.undeclare()
-        self._poses.undeclare()
+        for undo in reversed(self._undo):
+            undo()
         if self._owned:
             self._session.close()
 
