@@ -5,8 +5,7 @@ import json
 import sys
 
 import numpy as np
-from covista_clients import Camera, Pose, Rover
-from covista_schemas.messages import Features
+from covista_clients import Camera, Features, Pose, Rover
 
 random = np.random.default_rng(0)
 features = Features.from_arrays("orb", random.uniform(0, 200, (50, 2)), random.integers(0, 256, (50, 32), np.uint8))
