@@ -1,0 +1,156 @@
+"""The groups in force: evaluated when the similarity has changed, told when they have."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from covista_schemas.reports import EventKind
+
+from covista_service.grouping import similarity as eqs
+from covista_service.grouping.affinity import Affinity
+from covista_service.grouping.continuity import Change, Members, changes, follow
+from covista_service.grouping.selection import Choice, SelectionOptions, choose
+from covista_service.grouping.similarity import Floats
+from covista_service.station.events import Effect, GroupsChanged, Happened, Pair
+from covista_service.station.options import GroupingOptions, StationOptions, nanoseconds
+from covista_service.station.snapshot import GroupsView, GroupView, Reason, SimilarityView
+
+Ungrouped = tuple[tuple[str, Reason], ...]
+
+
+class Groups:
+    """Affinity of the robots that can be grouped, and the labelled groups that stand since `revision`."""
+
+    def __init__(self, options: StationOptions) -> None:
+        self._affinity = Affinity()
+        self._regroup_after_ns = nanoseconds(options.regroup_after_s)
+        self._members: dict[str, Members] = {}
+        self._label_of: dict[str, str] = {}
+        self._next_label = 1
+        # News of pairs, robots or settings is evaluated at once, drift of positions a few times a second.
+        self._news = self._drift = False
+        self._evaluated_ns = 0
+        self.view = GroupsView(0, 0, (), (), (), options.grouping)
+        self.similarity = SimilarityView(0, (), *(_frozen(np.zeros((0, 0))) for _ in range(4)))
+
+    def __contains__(self, robot: object) -> bool:
+        return robot in self._affinity
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """Robots that take part, sorted."""
+        return self._affinity.robots
+
+    def label_of(self, robot: str) -> str | None:
+        """Label of the group that a robot stands in."""
+        return self._label_of.get(robot)
+
+    def place(self, robot: str, position_m: Floats) -> None:
+        """Set a robot's position; it takes part from now on."""
+        if robot in self._affinity:
+            self._affinity.move(robot, position_m)
+            self._drift = True
+        else:
+            self._affinity.add(robot, position_m)
+            self._news = True
+
+    def withdraw(self, robot: str) -> None:
+        """A robot takes part no longer."""
+        if robot in self._affinity:
+            self._affinity.remove(robot)
+            self._news = True
+
+    def see(self, pair: Pair, overlaps: tuple[float, float] | None) -> None:
+        """Set a pair's overlaps, None where unknown; nothing happens while one of the two takes no part."""
+        if pair[0] in self._affinity and pair[1] in self._affinity:
+            self._affinity.see(*pair, *(overlaps or (None, None)))
+            self._news = True
+
+    def set_options(self, options: GroupingOptions) -> None:
+        """Group by other settings from the next evaluation on."""
+        self.view = replace(self.view, settings=options)
+        self._news = True
+
+    def evaluate(self, ungrouped: Ungrouped, now_ns: int) -> list[Effect]:
+        """Bring similarity and groups up to date if there is news; a new revision only if someone stands elsewhere."""
+        drifted = self._drift and now_ns - self._evaluated_ns >= self._regroup_after_ns
+        if self._news or drifted:
+            scores, members = self._regroup()
+            self._news = self._drift = False
+            self._evaluated_ns = now_ns
+        elif ungrouped != self.view.ungrouped:
+            scores, members = self.view.scores, self._members
+        else:
+            return []
+        revision, settings = self.view.revision, self.view.settings
+        if members == self._members and ungrouped == self.view.ungrouped:
+            self.view = replace(self.view, scores=scores)
+            return []
+        groups = tuple(GroupView(label, tuple(sorted(robots))) for label, robots in members.items())
+        self.view = GroupsView(revision + 1, now_ns, groups, ungrouped, scores, settings)
+        return self._tell(members, now_ns)
+
+    def _regroup(self) -> tuple[tuple[tuple[int, float], ...], dict[str, Members]]:
+        """Choose groups for the similarity as it is now, and name them."""
+        affinity, options = self._affinity, self.view.settings
+        distance_m, overlap = affinity.distance_m, affinity.overlap
+        closeness = eqs.closeness(distance_m, options.sigma)
+        S = eqs.similarity(overlap, closeness, options.alpha)
+        matrices = (_frozen(matrix) for matrix in (S, overlap, closeness, distance_m))
+        self.similarity = SimilarityView(self.similarity.revision + 1, affinity.robots, *matrices)
+        choice = _choose(S, options)
+        robots = np.array(affinity.robots)
+        clusters = [frozenset(robots[choice.labels == label].tolist()) for label in np.unique(choice.labels)]
+        following = follow(self._members, clusters, self._next_label)
+        self._next_label = following.next_label
+        return choice.scores, following.groups
+
+    def _tell(self, members: dict[str, Members], now_ns: int) -> list[Effect]:
+        """What follows from a new revision."""
+        before, self._members = self._members, members
+        former, self._label_of = self._label_of, {robot: label for label in members for robot in members[label]}
+        moved = [
+            robot
+            for robot in sorted(former.keys() | self._label_of.keys())
+            if _own(before, former.get(robot)) != _own(members, self._label_of.get(robot))
+        ]
+        revision = self.view.revision
+        happened = [_happened(change, now_ns, revision) for change in changes(before, members)]
+        everyone = tuple(sorted(self._label_of))
+        whole = Happened(EventKind.GROUPS, now_ns, self._words(), everyone, tuple(members), revision - 1, revision)
+        return [GroupsChanged(revision, tuple(moved)), whole, *happened]
+
+    def _words(self) -> str:
+        parts = [f"{group.label}: {', '.join(group.robots)}" for group in self.view.groups]
+        parts += [f"{robot} {reason.replace('_', ' ')}" for robot, reason in self.view.ungrouped]
+        return "; ".join(parts) or "no robots"
+
+
+def _choose(S: Floats, options: GroupingOptions) -> Choice:
+    """As many groups as asked for, or as there are robots."""
+    groups = options.groups
+    if isinstance(groups, int):
+        groups = min(groups, len(S))
+    return choose(S, SelectionOptions(groups, options.criterion))
+
+
+def _own(groups: dict[str, Members], label: str | None) -> tuple[str, Members] | None:
+    return None if label is None else (label, groups[label])
+
+
+def _happened(change: Change, now_ns: int, revision: int) -> Happened:
+    robots, first, rest = ", ".join(change.robots), change.labels[0], ", ".join(change.labels[1:])
+    text = {
+        "join": f"{robots} joined {first}",
+        "leave": f"{robots} left {first}",
+        "split": f"{robots} split from {first} into {rest}",
+        "merge": f"{rest} merged into {first}",
+        "moved": f"{robots} moved from {first} to {rest}",
+    }[change.kind]
+    return Happened(EventKind(change.kind), now_ns, text, change.robots, change.labels, revision - 1, revision)
+
+
+def _frozen(matrix: Floats) -> Floats:
+    matrix.flags.writeable = False
+    return matrix

@@ -1,0 +1,153 @@
+"""What became of every message of a robot, so that nothing is lost uncounted."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections import Counter, OrderedDict
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+MessageId = tuple[str, int]
+# More gaps than this in one boot are counted but no longer told apart from what was heard.
+MAX_INTERVALS = 1024
+# Of older boots only the number of missing messages is kept.
+MAX_BOOTS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """Messages of one robot and topic, all boots.
+
+    sent = received + missing; received = used + replaced + duplicate + waiting + the sum of dropped (by reason).
+    """
+
+    received: int = 0
+    used: int = 0
+    replaced: int = 0
+    duplicate: int = 0
+    missing: int = 0
+    waiting: int = 0
+    dropped: Mapping[str, int] = field(default_factory=dict)
+
+
+class Sequences:
+    """Which sequence numbers of a boot were heard, as merged intervals [start, end)."""
+
+    def __init__(self) -> None:
+        self._starts: list[int] = []
+        self._ends: list[int] = []
+        self._heard = 0
+
+    @property
+    def missing(self) -> int:
+        """Numbers from 0 to the highest one that were not heard."""
+        return self._ends[-1] - self._heard if self._ends else 0
+
+    def __contains__(self, number: int) -> bool:
+        at = bisect_right(self._starts, number) - 1
+        return at >= 0 and number < self._ends[at]
+
+    def add(self, number: int) -> bool:
+        """Hear a number; False if it was heard before."""
+        if self._ends and number == self._ends[-1]:
+            self._ends[-1] += 1
+        elif number in self:
+            return False
+        else:
+            self._insert(bisect_right(self._starts, number), number)
+        self._heard += 1
+        return True
+
+    def _insert(self, at: int, number: int) -> None:
+        joins_left = at > 0 and self._ends[at - 1] == number
+        joins_right = at < len(self._starts) and self._starts[at] == number + 1
+        if joins_left and joins_right:
+            self._ends[at - 1] = self._ends.pop(at)
+            del self._starts[at]
+        elif joins_left:
+            self._ends[at - 1] += 1
+        elif joins_right:
+            self._starts[at] -= 1
+        else:
+            self._starts.insert(at, number)
+            self._ends.insert(at, number + 1)
+            if len(self._starts) > MAX_INTERVALS:
+                del self._starts[1], self._ends[0]
+
+
+class Ledger:
+    """The accounts of one robot and topic."""
+
+    def __init__(self) -> None:
+        self._boots: OrderedDict[str, Sequences] = OrderedDict()
+        self._missing_before = 0
+        self._counts: Counter[str] = Counter()
+        self._dropped: Counter[str] = Counter()
+        # Announced: received, its content still to come. Open: its content is here, its fate undecided.
+        self._announced: dict[MessageId, None] = {}
+        self._open: set[MessageId] = set()
+
+    def hear(self, messages: Iterable[MessageId], kept: MessageId | None) -> None:
+        """Enter arrivals in order; `kept` is to come with its content, what else is new was replaced."""
+        for message in messages:
+            self._counts["received"] += 1
+            if not self._sequences(message[0]).add(message[1]):
+                self._counts["duplicate"] += 1
+            elif message == kept:
+                self._announced[message] = None
+            else:
+                self._counts["replaced"] += 1
+
+    def take(self, message: MessageId) -> bool:
+        """Open a message whose content is here; False if it was taken before and counts as a duplicate already."""
+        if message[1] not in self._sequences(message[0]):
+            self.hear((message,), message)
+        if message not in self._announced:
+            return False
+        del self._announced[message]
+        self._open.add(message)
+        return True
+
+    def settle(self, message: MessageId, fate: Literal["used", "replaced"]) -> None:
+        """Decide what became of an open message."""
+        self._open.remove(message)
+        self._counts[fate] += 1
+
+    def reject(self, message: MessageId, code: str) -> None:
+        """An open message turned out to be of no use."""
+        self._open.remove(message)
+        self._dropped[code] += 1
+
+    def drop(self, code: str, count: int, *, counted: bool) -> None:
+        """Messages that could not be read; `counted` if they were heard before.
+
+        Those are the announced ones; what was not announced had been taken for replaced.
+        """
+        self._dropped[code] += count
+        if not counted:
+            self._counts["received"] += count
+            return
+        announced = min(count, len(self._announced))
+        for message in list(self._announced)[:announced]:
+            del self._announced[message]
+        self._counts["replaced"] -= count - announced
+
+    def counts(self) -> Counts:
+        """The accounts now."""
+        return Counts(
+            received=self._counts["received"],
+            used=self._counts["used"],
+            replaced=self._counts["replaced"],
+            duplicate=self._counts["duplicate"],
+            missing=self._missing_before + sum(sequences.missing for sequences in self._boots.values()),
+            waiting=len(self._announced) + len(self._open),
+            dropped=dict(self._dropped),
+        )
+
+    def _sequences(self, boot: str) -> Sequences:
+        if boot not in self._boots:
+            self._boots[boot] = Sequences()
+            if len(self._boots) > MAX_BOOTS:
+                self._missing_before += self._boots.popitem(last=False)[1].missing
+        return self._boots[boot]

@@ -1,0 +1,46 @@
+"""Options of the station: times of presence and of answers, room for surveys, and how robots are grouped."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from covista_service.grouping.selection import Criterion, Groups
+from covista_service.grouping.similarity import Sigma
+
+NS_PER_S = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class GroupingOptions:
+    """The settings that may change while the station runs: Eqs. 15 to 17."""
+
+    alpha: float = 0.5
+    groups: Groups = "auto"
+    sigma: Sigma = "std"
+    criterion: Criterion = "fiedler"
+
+
+@dataclass(frozen=True, slots=True)
+class StationOptions:
+    """`capacity` is how many surveys, and how many extractions, may be under way at once.
+
+    A robot is stale when silent for `live_after_s`, gone after `gone_after_s` more, forgotten `forget_after_s` after
+    its last sign of life. An answer about a pair is decayed, then unknown, so long after it was computed. A pair whose
+    views cannot meet, as far as known, is tried all the same every `retry_after_s`. Poses alone regroup at most every
+    `regroup_after_s`.
+    """
+
+    capacity: int = 2
+    live_after_s: float = 5.0
+    gone_after_s: float = 30.0
+    forget_after_s: float = 600.0
+    decay_after_s: float = 60.0
+    unknown_after_s: float = 600.0
+    retry_after_s: float = 30.0
+    regroup_after_s: float = 0.1
+    grouping: GroupingOptions = GroupingOptions()
+
+
+def nanoseconds(seconds: float) -> int:
+    """Seconds as whole nanoseconds."""
+    return round(seconds * NS_PER_S)

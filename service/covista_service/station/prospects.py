@@ -1,0 +1,55 @@
+"""What two keyframes may have in common before their images are compared: poses and depths alone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from covista_service.perception import frustum
+from covista_service.perception.camera import Floats
+from covista_service.station.events import Keyframe, KeyframeId
+
+_LEAST_POINTS = 8
+# Matched points show the textured part of a scene only: nearer and farther surfaces may be there.
+_NEARER, _FARTHER = 0.3, 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Depth:
+    """How deep a robot's scene is, by the matched points of a survey of `keyframe`; metres along the optical axis."""
+
+    keyframe: KeyframeId
+    points: int
+    near_m: float
+    median_m: float
+    far_m: float
+
+
+def depth_of(keyframe: KeyframeId, depths_m: Floats) -> Depth | None:
+    """The depth of a keyframe from its points' depths (k,), None if there are too few."""
+    if len(depths_m) < _LEAST_POINTS:
+        return None
+    near, median, far = np.percentile(depths_m, (5, 50, 95))
+    if near <= 0:
+        return None
+    return Depth(keyframe, len(depths_m), float(near), float(median), float(far))
+
+
+def may_meet(first: Keyframe, first_depth: Depth | None, second: Keyframe, second_depth: Depth | None) -> bool:
+    """Can the two views meet, as far as is known? Unknown depths reach to infinity."""
+    return frustum.may_meet(
+        first.camera, first.pose, _range_m(first_depth), second.camera, second.pose, _range_m(second_depth)
+    )
+
+
+def predict(first: Keyframe, first_depth: Depth, second: Keyframe, second_depth: Depth) -> tuple[float, float]:
+    """q_1 and q_2 if each image showed a plane at its median depth."""
+    return frustum.overlap(
+        first.camera, first.pose, first_depth.median_m, second.camera, second.pose, second_depth.median_m
+    )
+
+
+def _range_m(depth: Depth | None) -> tuple[float, float]:
+    return (0.0, math.inf) if depth is None else (_NEARER * depth.near_m, _FARTHER * depth.far_m)

@@ -1,0 +1,139 @@
+"""Who is there: presence, poses and keyframes of every robot."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from covista_schemas.reports import Status
+
+from covista_service.perception.camera import Pose
+from covista_service.station.events import Keyframe, Topic
+from covista_service.station.ledger import Ledger
+from covista_service.station.options import StationOptions, nanoseconds
+from covista_service.station.prospects import Depth
+
+_PAST_BOOTS = 16
+# A robot's clock that falls back by more than this was set; by less, the message is late.
+_CLOCK_SET_NS = nanoseconds(10)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fix:
+    """The newest pose of a robot, from a keyframe or a pose message; `time_ns` is sensor time."""
+
+    pose: Pose
+    time_ns: int
+    boot: str
+
+
+@dataclass(slots=True, eq=False)
+class Robot:
+    """One robot, as far as the station has heard of it.
+
+    `arrived` is its newest keyframe, `keyframe` the newest one with features, which is in use.
+    """
+
+    id: str
+    status: Status | None = None
+    tokens: set[str] = field(default_factory=set)
+    sign_of_life_ns: int = 0
+    last_seen_ns: int | None = None
+    clock_offset_ns: int | None = None
+    boot: str | None = None
+    past_boots: deque[str] = field(default_factory=lambda: deque(maxlen=_PAST_BOOTS))
+    fix: Fix | None = None
+    pose_sequence: int = -1
+    arrived: Keyframe | None = None
+    keyframe: Keyframe | None = None
+    depth: Depth | None = None
+    last_problem: str | None = None
+    ledgers: dict[Topic, Ledger] = field(default_factory=lambda: {"keyframe": Ledger(), "pose": Ledger()})
+
+    def enters(self, boot: str) -> bool:
+        """Take a boot for the current one, unless it has been superseded before; True if it is current now."""
+        if boot == self.boot:
+            return True
+        if boot in self.past_boots:
+            return False
+        if self.boot is not None:
+            self.past_boots.append(self.boot)
+        self.boot = boot
+        self.pose_sequence = -1
+        return True
+
+    def locate(self, pose: Pose, time_ns: int, boot: str) -> bool:
+        """Take a pose for the newest if it is, by sensor time within one boot."""
+        held = self.fix
+        late_ns = 0 if held is None or held.boot != boot else held.time_ns - time_ns
+        if 0 < late_ns <= _CLOCK_SET_NS:
+            return False
+        self.fix = Fix(pose, time_ns, boot)
+        return True
+
+    def heard(self, arrived_ns: int, time_ns: int | None = None) -> None:
+        """Note a message: presence by its arrival, the offset of the robot's clock by its sensor time."""
+        self.last_seen_ns = max(arrived_ns, self.last_seen_ns or 0)
+        self.sign_of_life_ns = max(arrived_ns, self.sign_of_life_ns)
+        if time_ns is not None:
+            self.clock_offset_ns = time_ns - arrived_ns
+
+
+class Roster:
+    """All robots by id. Presence is a function of the last sign of life and of the time asked for."""
+
+    def __init__(self, options: StationOptions) -> None:
+        self._stale_after_ns = nanoseconds(options.live_after_s)
+        self._gone_after_ns = nanoseconds(options.live_after_s + options.gone_after_s)
+        self._forget_after_ns = nanoseconds(options.forget_after_s)
+        self._robots: dict[str, Robot] = {}
+
+    def __iter__(self) -> Iterator[Robot]:
+        return iter(self._robots.values())
+
+    def __contains__(self, robot: object) -> bool:
+        return robot in self._robots
+
+    def __getitem__(self, robot: str) -> Robot:
+        return self._robots[robot]
+
+    def get(self, robot: str) -> Robot | None:
+        """A robot, if it is known."""
+        return self._robots.get(robot)
+
+    def meet(self, robot: str) -> Robot:
+        """A robot, known from now on."""
+        if robot not in self._robots:
+            self._robots[robot] = Robot(robot)
+        return self._robots[robot]
+
+    def forget(self, robot: str) -> None:
+        """Drop all that is known of a robot."""
+        del self._robots[robot]
+
+    def token_seen(self, robot: str, boot: str, now_ns: int) -> None:
+        """A liveliness token is there."""
+        known = self.meet(robot)
+        known.tokens.add(boot)
+        if known.boot is None:
+            known.boot = boot
+        known.sign_of_life_ns = now_ns
+
+    def token_lost(self, robot: str, boot: str, now_ns: int) -> None:
+        """A liveliness token vanished: it counts as a sign of life to the last, so that a bounce is not news."""
+        known = self._robots.get(robot)
+        if known is not None and boot in known.tokens:
+            known.tokens.remove(boot)
+            known.sign_of_life_ns = now_ns
+
+    def status(self, robot: Robot, now_ns: int) -> Status:
+        """Live, stale or gone at `now_ns`."""
+        silent_ns = now_ns - robot.sign_of_life_ns
+        if robot.tokens or silent_ns < self._stale_after_ns:
+            return Status.LIVE
+        return Status.STALE if silent_ns < self._gone_after_ns else Status.GONE
+
+    def lapsed(self, robot: Robot, now_ns: int) -> bool:
+        """Has it been silent for so long that it is to be forgotten?"""
+        return not robot.tokens and now_ns - robot.sign_of_life_ns >= self._forget_after_ns

@@ -1,0 +1,143 @@
+"""What everyone but the station's own task reads: all that the station knows, frozen at one moment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Literal
+
+from covista_schemas.reports import FoundBy, Status
+
+from covista_service.grouping.similarity import Floats
+from covista_service.perception.camera import Camera
+from covista_service.perception.relative_pose import PoseSource
+from covista_service.perception.survey import Survey
+from covista_service.station.events import Keyframe, KeyframeId, Pair
+from covista_service.station.ledger import Counts
+from covista_service.station.options import NS_PER_S, GroupingOptions
+from covista_service.station.pairs import PairRecord, pair_of
+from covista_service.station.roster import Fix
+
+Reason = Literal["no_pose", "gone"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RobotView:
+    """One robot; `camera` is that of its newest keyframe, `keyframe` the newest in use."""
+
+    id: str
+    status: Status
+    group: str | None
+    boot: str | None
+    camera: Camera | None
+    fix: Fix | None
+    keyframe: KeyframeId | None
+    last_seen_ns: int | None
+    clock_offset_s: float | None
+    keyframes: Counts
+    poses: Counts
+    last_problem: str | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PairView:
+    """One pair, a < b. The keyframes are those that the overlaps were computed on.
+
+    `survey` is the last one, whose first image is a's; it explains the overlaps if they were found by image, or by
+    image once and decayed since: that is, if `survey.outcome` is measured.
+    """
+
+    a: str
+    b: str
+    overlap_a: float | None
+    overlap_b: float | None
+    found_by: FoundBy
+    outcome: str
+    survey: Survey | None
+    keyframe_a: Keyframe | None
+    keyframe_b: Keyframe | None
+    age_s: float | None
+
+    @property
+    def inliers(self) -> int:
+        """Matches that agreed with one geometry in the last survey."""
+        return 0 if self.survey is None else self.survey.inliers
+
+    @property
+    def pose_source(self) -> PoseSource | None:
+        """Where the relative pose behind the overlaps came from."""
+        return None if self.survey is None else self.survey.pose_source
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SimilarityView:
+    """The matrices (N, N) of the last evaluation in the order of `robots`; unknown overlaps are NaN."""
+
+    revision: int
+    robots: tuple[str, ...]
+    similarity: Floats
+    overlap: Floats
+    closeness: Floats
+    distance_m: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class GroupView:
+    """A group and its robots, sorted."""
+
+    label: str
+    robots: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class GroupsView:
+    """The grouping in force since `time_ns`, and the scores of the numbers of groups as last evaluated."""
+
+    revision: int
+    time_ns: int
+    groups: tuple[GroupView, ...]
+    ungrouped: tuple[tuple[str, Reason], ...]
+    scores: tuple[tuple[int, float], ...]
+    settings: GroupingOptions
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Snapshot:
+    """The station as of `now_ns`: ages and decay follow from the moment it was taken."""
+
+    now_ns: int
+    robots: Mapping[str, RobotView]
+    groups: GroupsView
+    similarity: SimilarityView
+    records: Mapping[Pair, PairRecord]
+    decay_after_ns: int
+    unknown_after_ns: int
+
+    def group_of(self, robot: str) -> GroupView | None:
+        """The group that a robot stands in."""
+        return next((group for group in self.groups.groups if robot in group.robots), None)
+
+    def pair(self, a: str, b: str) -> PairView:
+        """One pair of known robots in either order, seen from the smaller id; KeyError if a robot is not known."""
+        a, b = pair_of(self.robots[a].id, self.robots[b].id)
+        record = self.records.get((a, b), PairRecord())
+        answer = record.answer
+        age_ns = 0 if answer is None else self.now_ns - answer.computed_ns
+        if answer is None or age_ns >= self.unknown_after_ns:
+            return PairView(a, b, None, None, FoundBy.UNKNOWN, record.outcome, record.survey, None, None, None)
+        return PairView(
+            a,
+            b,
+            *answer.overlaps,
+            FoundBy.DECAYED if age_ns >= self.decay_after_ns else answer.found_by,
+            record.outcome,
+            record.survey,
+            answer.first,
+            answer.second,
+            age_ns / NS_PER_S,
+        )
+
+    def pairs(self) -> Iterator[PairView]:
+        """Every unordered pair of known robots once."""
+        return (self.pair(a, b) for a, b in combinations(sorted(self.robots), 2))

@@ -1,0 +1,270 @@
+"""The station: events in, effects out. It has no clock and no I/O; the same events give the same effects."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from covista_schemas.reports import EventKind, Status
+
+from covista_service.perception.camera import Pose
+from covista_service.station.events import (
+    Effect,
+    Event,
+    ExtractFeatures,
+    FeaturesExtracted,
+    GroupsEvaluated,
+    Happened,
+    Keyframe,
+    KeyframeArrived,
+    MessageDropped,
+    MessagesReceived,
+    PoseArrived,
+    SurveyDone,
+    Tick,
+    TokenLost,
+    TokenSeen,
+)
+from covista_service.station.extraction import Extractions
+from covista_service.station.groups import Groups, Ungrouped
+from covista_service.station.options import NS_PER_S, GroupingOptions, StationOptions, nanoseconds
+from covista_service.station.pairs import Pairs, pair_of
+from covista_service.station.roster import Robot, Roster
+from covista_service.station.snapshot import RobotView, Snapshot
+from covista_service.station.surveys import Surveys
+
+
+class Station:
+    """Keeps the roster, what every pair sees in common, and the groups.
+
+    Arrivals only change what is known; a Tick decides what follows: presence, surveys, groups.
+    """
+
+    def __init__(self, options: StationOptions | None = None) -> None:
+        self.options = options or StationOptions()
+        self._unknown_after_ns = nanoseconds(self.options.unknown_after_s)
+        self._roster = Roster(self.options)
+        self._pairs = Pairs(self._unknown_after_ns)
+        self._groups = Groups(self.options)
+        self._surveys = Surveys(self._roster, self._pairs, self._groups, self.options)
+        self._extractions = Extractions(self.options.capacity)
+        self._views: dict[str, RobotView] = {}
+        self._snapshot: Snapshot | None = None
+
+    def receive(self, event: Event, now_ns: int) -> list[Effect]:
+        """Take in one event that happened at `now_ns` and say what is to be done."""
+        if not isinstance(event, Tick):
+            self._snapshot = None
+        match event:
+            case MessagesReceived():
+                self._messages_received(event)
+            case MessageDropped():
+                self._message_dropped(event)
+            case KeyframeArrived(keyframe):
+                return self._keyframe_arrived(keyframe)
+            case PoseArrived():
+                self._pose_arrived(event)
+            case TokenSeen() | TokenLost():
+                self._token(event, now_ns)
+            case FeaturesExtracted():
+                return self._features_extracted(event)
+            case SurveyDone():
+                return [*self._surveys.done(event, now_ns)]
+            case Tick():
+                return self._tick(now_ns)
+        return []
+
+    def set_grouping(self, options: GroupingOptions) -> None:
+        """Group by other settings from the next Tick on."""
+        self.options = replace(self.options, grouping=options)
+        self._groups.set_options(options)
+        self._snapshot = None
+
+    def snapshot(self, now_ns: int) -> Snapshot:
+        """All that is known, for ages as of `now_ns`; cheap while nothing changes."""
+        if self._snapshot is None:
+            for robot in self._roster:
+                if robot.id not in self._views:
+                    self._views[robot.id] = self._view(robot)
+            self._snapshot = Snapshot(
+                now_ns,
+                {name: self._views[name] for name in sorted(self._views)},
+                self._groups.view,
+                self._groups.similarity,
+                self._pairs.records(),
+                nanoseconds(self.options.decay_after_s),
+                self._unknown_after_ns,
+            )
+        return replace(self._snapshot, now_ns=now_ns)
+
+    def _token(self, event: TokenSeen | TokenLost, now_ns: int) -> None:
+        if isinstance(event, TokenSeen):
+            self._touch(event.robot)
+            self._roster.token_seen(event.robot, event.boot, now_ns)
+        else:
+            self._roster.token_lost(event.robot, event.boot, now_ns)
+
+    def _messages_received(self, event: MessagesReceived) -> None:
+        robot = self._touch(event.robot)
+        robot.heard(event.arrived_ns)
+        robot.ledgers[event.topic].hear(event.sequences, event.kept)
+
+    def _message_dropped(self, event: MessageDropped) -> None:
+        robot = self._touch(event.robot)
+        robot.heard(event.arrived_ns)
+        robot.last_problem = event.text
+        robot.ledgers[event.topic].drop(event.code, event.count, counted=event.counted)
+
+    def _keyframe_arrived(self, keyframe: Keyframe) -> list[Effect]:
+        robot = self._touch(keyframe.id.robot)
+        robot.heard(keyframe.arrived_ns, keyframe.time_ns)
+        ledger, message = robot.ledgers["keyframe"], (keyframe.id.boot, keyframe.id.sequence)
+        if not ledger.take(message):
+            return []
+        if not robot.enters(keyframe.id.boot) or _older(keyframe, robot.arrived):
+            ledger.settle(message, "replaced")
+            return []
+        robot.arrived = keyframe
+        self._locate(robot, keyframe.pose, keyframe.time_ns, keyframe.id.boot)
+        if keyframe.features is None:
+            self._replace(self._extractions.wait(keyframe))
+        else:
+            self._replace(self._extractions.withdraw(robot.id))
+            self._use(robot, keyframe)
+        return self._extract()
+
+    def _features_extracted(self, event: FeaturesExtracted) -> list[Effect]:
+        keyframe, robot = self._extractions.done(event.keyframe), self._roster.get(event.keyframe.robot)
+        if keyframe is not None and robot is not None:
+            self._touch(robot.id)
+            if event.features is None:
+                message = (keyframe.id.boot, keyframe.id.sequence)
+                robot.ledgers["keyframe"].reject(message, event.code)
+                robot.last_problem = event.problem
+            elif keyframe.id.boot != robot.boot or _older(keyframe, robot.keyframe):
+                self._replace(keyframe)
+            else:
+                self._use(robot, replace(keyframe, features=event.features))
+        return self._extract()
+
+    def _pose_arrived(self, event: PoseArrived) -> None:
+        robot = self._touch(event.robot)
+        robot.heard(event.arrived_ns, event.time_ns)
+        ledger, message = robot.ledgers["pose"], (event.boot, event.sequence)
+        if not ledger.take(message):
+            return
+        newest = robot.enters(event.boot) and event.sequence > robot.pose_sequence
+        if newest:
+            robot.pose_sequence = event.sequence
+            newest = self._locate(robot, event.pose, event.time_ns, event.boot)
+        ledger.settle(message, "used" if newest else "replaced")
+
+    def _use(self, robot: Robot, keyframe: Keyframe) -> None:
+        robot.ledgers["keyframe"].settle((keyframe.id.boot, keyframe.id.sequence), "used")
+        self._surveys.keyframe(robot, keyframe)
+
+    def _replace(self, keyframe: Keyframe | None) -> None:
+        if keyframe is not None:
+            ledger = self._roster[keyframe.id.robot].ledgers["keyframe"]
+            ledger.settle((keyframe.id.boot, keyframe.id.sequence), "replaced")
+
+    def _extract(self) -> list[Effect]:
+        return [ExtractFeatures(keyframe) for keyframe in self._extractions.start()]
+
+    def _locate(self, robot: Robot, pose: Pose, time_ns: int, boot: str) -> bool:
+        newest = robot.locate(pose, time_ns, boot)
+        if newest and robot.status is not Status.GONE:
+            self._place(robot)
+        return newest
+
+    def _place(self, robot: Robot) -> None:
+        """Let a robot with a pose take part in the groups, with all that is known of its pairs."""
+        if robot.fix is None:
+            return
+        newcomer = robot.id not in self._groups
+        self._groups.place(robot.id, robot.fix.pose.centre_m)
+        if newcomer:
+            for pair in (pair_of(robot.id, other) for other in self._groups.robots if other != robot.id):
+                self._groups.see(pair, self._pairs.overlaps(pair))
+
+    def _tick(self, now_ns: int) -> list[Effect]:
+        effects: list[Effect] = [*self._presence(now_ns)]
+        expired = self._pairs.expire(now_ns)
+        for pair in expired:
+            self._groups.see(pair, None)
+        judged = self._surveys.judge(now_ns)
+        effects += self._extract()
+        effects += self._surveys.start(now_ns)
+        effects += self._regroup(now_ns)
+        if effects or expired or judged:
+            self._snapshot = None
+        return effects
+
+    def _presence(self, now_ns: int) -> list[Happened]:
+        happened: list[Happened] = []
+        for robot in sorted(self._roster, key=lambda robot: robot.id):
+            if self._roster.lapsed(robot, now_ns):
+                self._forget(robot.id)
+                happened.append(Happened(EventKind.STATUS, now_ns, f"{robot.id} is forgotten", (robot.id,)))
+                continue
+            status = self._roster.status(robot, now_ns)
+            if status is not robot.status:
+                robot.status = status
+                self._touch(robot.id)
+                happened.append(Happened(EventKind.STATUS, now_ns, f"{robot.id} is {status}", (robot.id,)))
+                if status is Status.GONE:
+                    self._groups.withdraw(robot.id)
+                elif robot.id not in self._groups:
+                    self._place(robot)
+        return happened
+
+    def _regroup(self, now_ns: int) -> list[Effect]:
+        before = self._groups.view, self._groups.similarity
+        effects = self._groups.evaluate(self._ungrouped(), now_ns)
+        if (self._groups.view, self._groups.similarity) != before:
+            self._snapshot = None
+        if effects:
+            self._views.clear()
+        if seen := self._surveys.seen():
+            effects.append(GroupsEvaluated(seen))
+        return effects
+
+    def _ungrouped(self) -> Ungrouped:
+        return tuple(
+            (robot.id, "gone" if robot.status is Status.GONE else "no_pose")
+            for robot in sorted(self._roster, key=lambda robot: robot.id)
+            if robot.id not in self._groups
+        )
+
+    def _forget(self, robot: str) -> None:
+        self._groups.withdraw(robot)
+        self._surveys.forget(robot)
+        self._extractions.forget(robot)
+        self._roster.forget(robot)
+        self._views.pop(robot, None)
+        self._snapshot = None
+
+    def _touch(self, robot: str) -> Robot:
+        self._views.pop(robot, None)
+        return self._roster.meet(robot)
+
+    def _view(self, robot: Robot) -> RobotView:
+        offset_ns = robot.clock_offset_ns
+        return RobotView(
+            id=robot.id,
+            status=robot.status or Status.LIVE,
+            group=self._groups.label_of(robot.id),
+            boot=robot.boot,
+            camera=None if robot.arrived is None else robot.arrived.camera,
+            fix=robot.fix,
+            keyframe=None if robot.keyframe is None else robot.keyframe.id,
+            last_seen_ns=robot.last_seen_ns,
+            clock_offset_s=None if offset_ns is None else offset_ns / NS_PER_S,
+            keyframes=robot.ledgers["keyframe"].counts(),
+            poses=robot.ledgers["pose"].counts(),
+            last_problem=robot.last_problem,
+        )
+
+
+def _older(keyframe: Keyframe, held: Keyframe | None) -> bool:
+    """Was it sent before another of the same boot?"""
+    return held is not None and held.id.boot == keyframe.id.boot and keyframe.id.sequence < held.id.sequence
