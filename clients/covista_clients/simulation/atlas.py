@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from covista_clients.simulation.textures import Picture
 
 LEVELS = 6
-GUTTER_PX = 12
+GUTTER_PX = 8
 _ALIGN = 1 << (LEVELS - 1)
 
 

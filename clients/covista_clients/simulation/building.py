@@ -15,8 +15,10 @@ from covista_clients.simulation.atlas import GUTTER_PX, Atlas, lay_out, with_lev
 from covista_clients.simulation.textures import Material, Picture
 from covista_clients.simulation.world import Facets, Floats
 
-# Texels of level 0, all facets together: bounds time to build (about 0.1 s per million) and memory (4.5 bytes each).
+# Texels of level 0, all facets together: bounds time to build (about 0.1 s per million) and memory (5 bytes each).
 TEXELS = 8_000_000
+TEXELS_OF_LARGE_WORLDS = 12_000_000
+_LARGE_M2 = 700.0
 FINEST_TEXELS_PER_M = 320.0
 SUN = np.array((-0.42, -0.5, 0.76)) / np.linalg.norm((-0.42, -0.5, 0.76))
 _SHADE = 0.66
@@ -59,7 +61,8 @@ class Panel:
     @property
     def normal(self) -> Floats:
         """Unit vector towards who sees the panel upright."""
-        return np.cross(self.down, self.right)
+        (a, b, c), (x, y, z) = self.down.tolist(), self.right.tolist()
+        return np.array((b * z - c * y, c * x - a * z, a * y - b * x))
 
 
 def ground(lower_m: tuple[float, float], upper_m: tuple[float, float], material: Material) -> Panel:
@@ -101,7 +104,9 @@ def assemble(panels: Sequence[Panel], solids: Sequence[Solid], rng: np.random.Ge
         np.array([panel.normal for panel in every]),
         np.array([panel.extent_m for panel in every]),
     )
-    texels_per_m = min(FINEST_TEXELS_PER_M, math.sqrt(TEXELS / facets.extent_m.prod(axis=1).sum()))
+    area_m2 = float(facets.extent_m.prod(axis=1).sum())
+    texels = TEXELS if area_m2 < _LARGE_M2 else TEXELS_OF_LARGE_WORLDS
+    texels_per_m = min(FINEST_TEXELS_PER_M, math.sqrt(texels / area_m2))
     layout = lay_out(facets.extent_m, texels_per_m)
     pictures = [
         _painted(panel, height, width, texels_per_m, solids, child)

@@ -41,7 +41,8 @@ def _free_places(court: Court, sight: Floats, rng: np.random.Generator) -> Float
     angle = normal + np.clip(rng.normal(0, _ASIDE_RAD / 1.5, _DRAWS), -_ASIDE_RAD, _ASIDE_RAD)
     distance = rng.uniform(_NEAREST_M, _FURTHEST_M, _DRAWS)
     places = sight[:2] + distance[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    return np.asarray(places[(clearance_m(court, places) >= CLEARANCE_M) & _unhidden(court, sight, places)], np.float64)
+    free = places[clearance_m(court, places) >= CLEARANCE_M]
+    return np.asarray(free[_unhidden(court, sight, free)], np.float64)
 
 
 def towards(place_m: Floats, sight: Floats, height_m: float) -> tuple[float, float]:
@@ -72,7 +73,7 @@ def viewpoints(world: World, count: int, seed: int = 0) -> list[Pose]:
 def _unhidden(court: Court, sight: Floats, places: Floats) -> NDArray[np.bool_]:
     """Whether the way from places (n, 2) to just before the sight keeps off every obstacle."""
     end = sight[:2] + 0.05 * sight[3:5]
-    share = np.linspace(0, 1, 24)[:, None, None]
+    share = np.linspace(0, 1, 20)[:, None, None]
     way = places + share * (end - places)
     free = to_obstacles_m(court, way.reshape(-1, 2)) > 0
     return np.asarray(free.reshape(len(share), -1).all(axis=0), np.bool_)

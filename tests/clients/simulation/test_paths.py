@@ -60,13 +60,13 @@ def test_who_watches_the_same_sight_faces_it(world: Worlds) -> None:
             assert cosine > np.cos(np.radians(25))
 
 
-def test_a_thousand_rovers_spread_over_as_many_courts_as_they_need() -> None:
-    arena = worlds.build("arena", 0, robots=1000)
-    paths = Paths(arena, 1000, 0)
-    places = np.array([paths.pose(k, 30.0).position_m for k in range(1000)])
+def test_a_hundred_rovers_spread_over_as_many_courts_as_they_need() -> None:
+    arena = worlds.build("arena", 0, robots=100)
+    paths = Paths(arena, 100, 0)
+    places = np.array([paths.pose(k, 30.0).position_m for k in range(100)])
     inside = [((places[:, :2] > c.lower_m) & (places[:, :2] < c.upper_m)).all(axis=1).sum() for c in arena.courts]
-    assert len(inside) == 167
-    assert sum(inside) == 1000
+    assert len(inside) == 17
+    assert sum(inside) == 100
     assert max(inside) == 6
 
 

@@ -85,11 +85,11 @@ def test_patches_have_room_of_their_own() -> None:
 def test_mip_levels_are_means(world: Worlds) -> None:
     atlas = world("corner").atlas
     height, width = atlas.image.shape[0], int(atlas.level_px[1, 0])
-    base = atlas.image[:, :width].astype(float)
-    for level in range(1, LEVELS):
+    base = atlas.image[:, :width, 0].astype(np.float32)
+    for level in (1, 2, LEVELS - 1):
         x, y = atlas.level_px[level].astype(int)
         size = 2**level
-        small = atlas.image[y : y + height // size, x : x + width // size]
-        mean = base.reshape(height // size, size, width // size, size, 3).mean(axis=(1, 3))
+        small = atlas.image[y : y + height // size, x : x + width // size, 0]
+        mean = base.reshape(height // size, size, width // size, size).mean(axis=(1, 3))
         # Every level rounds once.
         assert np.abs(mean - small).max() <= 0.51 * level + 0.5

@@ -1,0 +1,188 @@
+"""Simulated rovers that drive through a world in real time and send what their cameras see."""
+
+from __future__ import annotations
+
+import itertools
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from covista_schemas.messages import Camera, Pose
+from numpy.typing import NDArray
+
+from covista_clients.simulation import worlds
+from covista_clients.simulation.fleet import Sending, fleet
+from covista_clients.simulation.pacing import Due, Pace, RealTime, schedule
+from covista_clients.simulation.paths import Paths
+from covista_clients.simulation.renderer import render
+from covista_clients.simulation.viewing import pinhole
+from covista_clients.simulation.world import World
+
+
+@dataclass(frozen=True, slots=True)
+class SwarmOptions:
+    """A swarm: how many rovers, where, how often they send, and to whom. Raises ValueError for what makes no sense."""
+
+    robots: int = 6
+    world: str = "arena"
+    seed: int = 0
+    rate_hz: float = 2.0
+    pose_rate_hz: float = 10.0
+    connect: str = "tcp/127.0.0.1:7447"
+    site: str = "default"
+    send: Sending = "image"
+    width: int = 320
+    height: int = 240
+
+    def __post_init__(self) -> None:
+        if self.robots < 1:
+            raise ValueError(f"a swarm has at least 1 robot, not {self.robots}")
+        if self.world not in worlds.WORLDS:
+            raise ValueError(f"there is no world {self.world!r}, but {', '.join(worlds.WORLDS)}")
+        if not (self.rate_hz > 0 and self.pose_rate_hz >= 0):
+            raise ValueError("rate_hz must be positive, and pose_rate_hz not negative")
+
+
+@dataclass(frozen=True, slots=True)
+class KeyframeRecord:
+    """A keyframe handed to its rover: its name, and the pose that its picture was rendered from.
+
+    While a rover has no station, or is slow, a keyframe replaces the one that waits and takes over its name: of records
+    with one name the last one holds.
+    """
+
+    robot: str
+    boot: str
+    sequence: int
+    pose: Pose
+
+
+@dataclass(slots=True)
+class Progress:
+    """Counts of a running swarm, kept up to date while it runs.
+
+    `keyframes` that were handed over, those aside that a newer one `replaced` before they went out; `skipped` were not
+    even rendered, since the swarm was behind; `behind_s` is how late the last message was.
+    """
+
+    keyframes: int = 0
+    replaced: int = 0
+    poses: int = 0
+    skipped: int = 0
+    behind_s: float = 0.0
+    most_behind_s: float = 0.0
+
+
+class Named(Protocol):
+    """What a rover answers when it takes a keyframe."""
+
+    @property
+    def boot(self) -> str:
+        """The rover's boot."""
+
+    @property
+    def sequence(self) -> int:
+        """The keyframe's number in it."""
+
+
+class Sender(Protocol):
+    """What a swarm needs of a rover."""
+
+    def send_pose(self, pose: Pose) -> object:
+        """Send a pose."""
+
+    def send_keyframe(self, image: NDArray[np.uint8], pose: Pose) -> Named:
+        """Send a picture and the pose that it was taken from."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Swarm:
+    """A swarm without a link: its world, camera and paths. The same options give the same swarm."""
+
+    options: SwarmOptions
+    world: World
+    camera: Camera
+    paths: Paths
+
+
+def names(options: SwarmOptions) -> list[str]:
+    """The robots' ids, r1 to rN."""
+    return [f"r{k + 1}" for k in range(options.robots)]
+
+
+def camera(options: SwarmOptions) -> Camera:
+    """The camera that all rovers have."""
+    return pinhole(options.width, options.height)
+
+
+def swarm(options: SwarmOptions) -> Swarm:
+    """Build the world and lay out the paths."""
+    world = worlds.build(options.world, options.seed, options.robots)
+    return Swarm(options, world, camera(options), Paths(world, options.robots, options.seed))
+
+
+def run_swarm(
+    options: SwarmOptions,
+    stop: threading.Event,
+    on_keyframe: Callable[[KeyframeRecord], None] | None = None,
+    seconds: float | None = None,
+    leave: threading.Event | None = None,
+    progress: Progress | None = None,
+) -> Progress:
+    """Drive and send in real time for `seconds`, or until `stop` is set; then, if given, stay until `leave` is set.
+
+    `on_keyframe` is called for every keyframe handed to its rover; `progress` is kept up to date while it runs.
+    """
+    progress = progress or Progress()
+    built = swarm(options)
+    with fleet(names(options), built.camera, options.connect, options.site, options.send, stop) as rovers:
+        for record in drive(built, rovers, RealTime(stop), time.time_ns(), seconds, progress):
+            if on_keyframe:
+                on_keyframe(record)
+        if leave is not None:
+            leave.wait()
+    return progress
+
+
+def drive(
+    built: Swarm,
+    senders: Sequence[Sender],
+    pace: Pace,
+    begin_ns: int,
+    seconds: float | None = None,
+    progress: Progress | None = None,
+) -> Iterator[KeyframeRecord]:
+    """Send what is due, in order, and yield the keyframes; one that is more than a period late is skipped.
+
+    Poses and pictures are those of the time at which they are due, whenever they go out; `begin_ns` is sensor time 0.
+    """
+    progress = progress or Progress()
+    options = built.options
+    newest: dict[str, int] = {}
+    due_all = schedule(options.robots, options.rate_hz, options.pose_rate_hz)
+    for due in itertools.takewhile(lambda due: seconds is None or due.t_s < seconds, due_all):
+        if not pace.wait_until(due.t_s):
+            return
+        progress.behind_s = max(0.0, pace.now_s() - due.t_s)
+        progress.most_behind_s = max(progress.most_behind_s, progress.behind_s)
+        pose = built.paths.pose(due.robot, due.t_s, begin_ns + round(due.t_s * 1e9))
+        if not due.is_keyframe:
+            senders[due.robot].send_pose(pose)
+            progress.poses += 1
+        elif progress.behind_s > 1 / options.rate_hz:
+            progress.skipped += 1
+        else:
+            record = _keyframe(built, senders[due.robot], due, pose)
+            is_new = record.sequence > newest.get(record.robot, -1)
+            newest[record.robot] = record.sequence
+            progress.keyframes += is_new
+            progress.replaced += not is_new
+            yield record
+
+
+def _keyframe(built: Swarm, sender: Sender, due: Due, pose: Pose) -> KeyframeRecord:
+    sent = sender.send_keyframe(render(built.world, built.camera, pose).image, pose)
+    return KeyframeRecord(f"r{due.robot + 1}", sent.boot, sent.sequence, pose)
