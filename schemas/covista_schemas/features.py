@@ -17,8 +17,11 @@ from covista_schemas.messages import DESCRIPTOR_BYTES, FeatureKind, Features, qu
 DEFAULT_COUNT = 1000
 # More detail than this does not help matching and costs time.
 MAX_SIDE_PX = 800
+# OpenCV's pyramids end with an error below.
+MIN_SIDE_PX = 16
 THUMBNAIL_WIDTH_PX = 96
 _EPSILON = 1e-7
+_ORB_SCALE = 1.2
 
 
 def extract(
@@ -27,25 +30,41 @@ def extract(
     """The strongest `count` features of `image`, (H, W) grey or (H, W, 3) BGR uint8; coordinates in its own pixels.
 
     RootSIFT (Arandjelovic and Zisserman, CVPR 2012): SIFT, L1-normalised, square root. Images larger than
-    `MAX_SIDE_PX` are shrunk first. An image without texture gives zero features.
+    `MAX_SIDE_PX` are shrunk first. An image without texture gives zero features. Raises ValueError for other arrays.
     """
     cv2 = opencv()
     kind = FeatureKind(kind)
-    grey, scale = _shrunk_grey(cv2, image)
-    detector: Any = cv2.SIFT_create(count) if kind is FeatureKind.ROOTSIFT else cv2.ORB_create(count)
-    keypoints, descriptors = detector.detectAndCompute(grey, None)
-    if descriptors is None or not len(keypoints):
-        empty = np.zeros((0, DESCRIPTOR_BYTES[kind]), np.uint8)
-        return Features(kind, np.zeros((0, 2), np.float32), empty)
+    grey, shrunk_by = _shrunk_grey(cv2, image)
+    large_enough = min(grey.shape) >= MIN_SIDE_PX
+    keypoints, descriptors = _detector(cv2, kind, count).detectAndCompute(grey, None) if large_enough else ((), None)
+    if descriptors is None:
+        return Features(kind, np.zeros((0, 2), np.float32), np.zeros((0, DESCRIPTOR_BYTES[kind]), np.uint8))
     # SIFT may return a few more than asked for where responses tie.
     strongest = np.argsort([-point.response for point in keypoints], kind="stable")[:count]
-    points = np.array([keypoints[i].pt for i in strongest], np.float32)
+    points = np.array([keypoints[i].pt for i in strongest], np.float64)
+    if kind is FeatureKind.ORB:
+        points = _centred(points, np.array([keypoints[i].octave for i in strongest]), grey)
     # Pixel centres are at integers: shrinking maps x to (x + .5) s - .5.
-    points = ((points + 0.5) / scale - 0.5).astype(np.float32)
-    high = np.array([image.shape[1], image.shape[0]], np.float32) - 0.5
-    points = np.clip(points, -0.5, np.nextafter(high, np.float32(0)))
+    points = (points + 0.5) / shrunk_by - 0.5
+    high = np.array([image.shape[1], image.shape[0]]) - 0.5
+    points_px = np.clip(points, -0.5, high).astype(np.float32)
     chosen = descriptors[strongest]
-    return Features(kind, points, root_sift(chosen) if kind is FeatureKind.ROOTSIFT else chosen)
+    return Features(kind, points_px, root_sift(chosen) if kind is FeatureKind.ROOTSIFT else chosen)
+
+
+def _detector(cv2: ModuleType, kind: FeatureKind, count: int) -> Any:
+    if kind is FeatureKind.ORB:
+        return cv2.ORB_create(count, scaleFactor=_ORB_SCALE)
+    # Without it SIFT's first enlargement moves every point by a quarter of a pixel.
+    return cv2.SIFT_create(count, enable_precise_upscale=True)
+
+
+def _centred(points: NDArray[np.float64], octaves: NDArray[np.intp], grey: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """Points (n, 2) px of ORB, which multiplies by the scale of a level as if pixel corners were at integers."""
+    size = np.array([grey.shape[1], grey.shape[0]])
+    scale = _ORB_SCALE ** octaves[:, None]
+    centred: NDArray[np.float64] = (points / scale + 0.5) * size / np.rint(size / scale) - 0.5
+    return centred
 
 
 def root_sift(sift: NDArray[np.float32]) -> NDArray[np.uint8]:
@@ -55,9 +74,10 @@ def root_sift(sift: NDArray[np.float32]) -> NDArray[np.uint8]:
 
 
 def thumbnail(image: NDArray[np.uint8], width: int = THUMBNAIL_WIDTH_PX) -> bytes:
-    """A small grey JPEG of `image`, for the station to weigh surfaces with."""
+    """A grey JPEG of `image` at most `width` px wide, for the station to weigh surfaces with."""
     cv2 = opencv()
     grey = _grey(cv2, image)
+    width = min(width, grey.shape[1])
     height = max(1, round(grey.shape[0] * width / grey.shape[1]))
     small = cv2.resize(grey, (width, height), interpolation=cv2.INTER_AREA)
     return encode_jpeg(small, quality=80)
@@ -66,9 +86,7 @@ def thumbnail(image: NDArray[np.uint8], width: int = THUMBNAIL_WIDTH_PX) -> byte
 def encode_jpeg(image: NDArray[np.uint8], quality: int = 85) -> bytes:
     """JPEG bytes of an image, (H, W) grey or (H, W, 3) BGR uint8."""
     cv2 = opencv()
-    done, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
-    if not done:
-        raise ValueError(f"OpenCV cannot encode an image of shape {image.shape} and type {image.dtype}")
+    _, data = cv2.imencode(".jpg", _checked(image), [cv2.IMWRITE_JPEG_QUALITY, quality])
     return bytes(data)
 
 
@@ -96,8 +114,15 @@ def opencv() -> ModuleType:
     return cv2
 
 
+def _checked(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    colours = image.shape[2:]
+    if image.dtype != np.uint8 or image.ndim < 2 or colours not in ((), (3,)) or not image.size:
+        raise ValueError(f"image: shape {image.shape} {image.dtype}, not (H, W) or (H, W, 3) uint8")
+    return image
+
+
 def _grey(cv2: ModuleType, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    grey: NDArray[np.uint8] = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+    grey: NDArray[np.uint8] = image if _checked(image).ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     return grey
 
 
