@@ -1,0 +1,1 @@
+"""The history of groups and events in a database, off the hot path."""

@@ -1,0 +1,39 @@
+"""How databases are opened."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from covista_schemas.errors import CovistaError
+from sqlalchemy import Engine, create_engine, event
+from sqlalchemy.exc import NoSuchModuleError
+
+# How long a write waits for another process that has the file locked.
+_BUSY_MS = 1000
+
+
+class DatabaseError(CovistaError):
+    """A database URL for which there is no driver."""
+
+
+def open_engine(url: str) -> Engine:
+    """An engine for `url`; nothing is connected yet. Raises DatabaseError."""
+    try:
+        engine = create_engine(url, pool_pre_ping=True)
+    except (ImportError, NoSuchModuleError) as error:
+        raise DatabaseError(
+            f"setting database (--database, COVISTA_DATABASE): no driver for it: {error}; "
+            "PostgreSQL needs pip install 'covista[scale]'"
+        ) from error
+    if engine.dialect.name == "sqlite":
+        event.listen(engine, "connect", _prepare_sqlite)
+    return engine
+
+
+def _prepare_sqlite(connection: Any, _record: object) -> None:
+    """Readers and the writer do not block each other, and a crash of the process loses nothing that was committed."""
+    cursor = connection.cursor()
+    cursor.execute(f"PRAGMA busy_timeout = {_BUSY_MS}")
+    cursor.execute("PRAGMA journal_mode = WAL")
+    cursor.execute("PRAGMA synchronous = NORMAL")
+    cursor.close()
