@@ -14,11 +14,11 @@ from covista_clients.simulation.vantage import open_sights, towards
 from covista_clients.simulation.viewing import facing
 from covista_clients.simulation.world import Court, Floats, World
 
-SCENE_S = 20.0
+SCENE_S = 18.0
 _SPEED_M_S = 0.7
 _TURN_RAD_S = math.radians(25)
 # Everyone has arrived, and has stood for a while, before the scene changes.
-_LOOKING_S = 5.0
+_LOOKING_S = 4.5
 _LATEST_START_S = 2.0
 _SWAY_M = 0.08
 _SWAY_RAD = math.radians(3)

@@ -14,6 +14,7 @@ from covista_clients.simulation.world import Court, Floats
 Indices = NDArray[np.int64]
 _WATCHERS_PER_SIGHT = 3
 _CANDIDATES = 4
+_RESTLESS = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +40,7 @@ def opening(stage: Stage, rovers: int, rng: np.random.Generator) -> Scene:
 
 
 def following(stage: Stage, scene: Scene, number: int, rng: np.random.Generator) -> Scene:
-    """The scene after `scene`: in turn a group splits, two groups merge, all regroup."""
+    """The scene after `scene`: in turn groups split, groups merge, all regroup."""
     change = (_split, _merge, None)[(number - 1) % 3]
     watched = np.array(scene.sights)
     after = change(stage, watched, rng) if change else _regroup(stage, len(watched), rng)
@@ -55,11 +56,12 @@ def _regroup(stage: Stage, rovers: int, rng: np.random.Generator) -> Indices:
 
 
 def _split(stage: Stage, watched: Indices, rng: np.random.Generator) -> Indices:
-    """Half of the largest group goes to another sight."""
-    values, counts = np.unique(watched, return_counts=True)
-    members = rng.permutation(np.flatnonzero(watched == values[counts.argmax()]))
+    """From every group somebody leaves, and those meet at another sight."""
     after = watched.copy()
-    after[members[: max(1, len(members) // 2)]] = _fresh(stage, values, rng)
+    fresh = _fresh(stage, watched, rng)
+    for value in np.unique(watched):
+        members = rng.permutation(np.flatnonzero(watched == value))
+        after[members[: max(1, len(members) // _WATCHERS_PER_SIGHT)]] = fresh
     return after
 
 
@@ -83,8 +85,9 @@ def _fresh(stage: Stage, watched: Indices, rng: np.random.Generator) -> int:
 
 
 def _placed(stage: Stage, watched: Indices, before: Scene | None, rng: np.random.Generator) -> Scene:
-    """Who keeps the sight keeps the place; the others find one, apart from all."""
-    staying = [before is not None and before.sights[k] == sight for k, sight in enumerate(watched)]
+    """Who changes the sight finds a place, apart from all; of the others half do, and half stay."""
+    restless = rng.random(len(watched)) < _RESTLESS
+    staying = [before is not None and before.sights[k] == sight and not restless[k] for k, sight in enumerate(watched)]
     places = list(before.places) if before else [(0, 0)] * len(watched)
     taken = [place(stage.grid, node) for node, stays in zip(places, staying, strict=True) if stays]
     for k, sight in enumerate(watched):

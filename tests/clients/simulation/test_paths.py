@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from covista_clients.simulation import worlds
 from covista_clients.simulation.lattice import SPACING_M, lattice, nearest_free, place, route
-from covista_clients.simulation.paths import Paths
+from covista_clients.simulation.paths import SCENE_S, Paths
 from covista_clients.simulation.viewing import world_from_camera
 from covista_clients.simulation.world import Court, World, to_obstacles_m
 
@@ -52,7 +52,7 @@ def test_groups_form_split_and_merge_within_two_minutes(world: Worlds, seed: int
 
 def test_who_watches_the_same_sight_faces_it(world: Worlds) -> None:
     paths = Paths(world("arena"), 6, 0)
-    for t in (1.0, 19.9, 59.9):
+    for t in (1.0, SCENE_S - 0.1, 3 * SCENE_S - 0.1):
         for k in range(6):
             pose = paths.pose(k, t)
             way = np.array(paths.watched(k, t)) - pose.position_m
