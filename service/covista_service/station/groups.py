@@ -31,7 +31,7 @@ class Groups:
         # News of pairs, robots or settings is evaluated at once, drift of positions a few times a second.
         self._news = self._drift = False
         self._evaluated_ns = 0
-        self.view = GroupsView(0, 0, (), (), (), options.grouping)
+        self.view = GroupsView(options.revision, 0, (), (), (), options.grouping)
         self.similarity = SimilarityView(0, (), *(_frozen(np.zeros((0, 0))) for _ in range(4)))
 
     def __contains__(self, robot: object) -> bool:

@@ -27,7 +27,7 @@ class StationOptions:
     A robot is stale when silent for `live_after_s`, gone after `gone_after_s` more, forgotten `forget_after_s` after
     its last sign of life. An answer about a pair is decayed, then unknown, so long after it was computed. A pair whose
     views cannot meet, as far as known, is tried all the same every `retry_after_s`. Poses alone regroup at most every
-    `regroup_after_s`.
+    `regroup_after_s`. `revision` is the last one of the groups that was told before this station started.
     """
 
     capacity: int = 2
@@ -38,6 +38,7 @@ class StationOptions:
     unknown_after_s: float = 600.0
     retry_after_s: float = 30.0
     regroup_after_s: float = 0.1
+    revision: int = 0
     grouping: GroupingOptions = GroupingOptions()
 
 
