@@ -51,8 +51,7 @@ def partition(spectrum: Spectrum, m: int) -> Labels:
     if m == count:
         return np.arange(count)
     rows = spectrum.rows(m)
-    runs = [_k_means(rows, seeds) for seeds in _best_seeds(rows, m)]
-    return canonical(min(runs, key=lambda run: run[1])[0])
+    return canonical(_k_means(rows, _best_seeds(rows, m)))
 
 
 def canonical(labels: Labels) -> Labels:
@@ -82,12 +81,13 @@ def _best_seeds(rows: Floats, m: int) -> NDArray[np.intp]:
     seeds = np.empty((len(last), m), np.intp)
     seeds[:, 0] = last
     taken, nearest = size[last], cosine[last]
+    room = np.empty_like(taken)
     for step in range(1, m):
         taken[everyone, last] = np.inf
         last = taken.argmin(axis=1)
         seeds[:, step] = last
-        np.maximum(taken, size[last], out=taken)
-        np.maximum(nearest, cosine[last], out=nearest)
+        np.maximum(taken, size.take(last, axis=0, out=room, mode="clip"), out=taken)
+        np.maximum(nearest, cosine.take(last, axis=0, out=room, mode="clip"), out=nearest)
     cost = -nearest.sum(axis=1)
     chosen: dict[tuple[int, ...], int] = {}
     for start in np.argsort(np.round(cost, 9), kind="stable"):
@@ -97,29 +97,35 @@ def _best_seeds(rows: Floats, m: int) -> NDArray[np.intp]:
     return np.array(list(chosen), np.intp)
 
 
-def _k_means(rows: Floats, seeds: NDArray[np.intp]) -> tuple[Labels, float]:
-    """Lloyd's rounds from rows `seeds` (m,): labels with no group empty, and their cost."""
-    m = len(seeds)
+def _k_means(rows: Floats, seeds: NDArray[np.intp]) -> Labels:
+    """Lloyd's rounds from rows `seeds` (runs, m), all runs at once: the cheapest labels, with no group empty."""
+    m = seeds.shape[1]
     centres = rows[seeds]
-    labels = np.full(len(rows), -1, np.intp)
+    labels = np.full((len(seeds), len(rows)), -1, np.intp)
     for _ in range(_ROUNDS):
-        distance = np.square(centres).sum(axis=1) - 2 * rows @ centres.T
-        fresh = _occupy(distance.argmin(axis=1), distance, m)
+        # Less |row|^2, which is the same for all centres.
+        distance = np.square(centres).sum(axis=2)[:, None, :] - 2 * rows @ centres.transpose(0, 2, 1)
+        fresh = distance.argmin(axis=2)
+        for run in range(len(seeds)):
+            _occupy(fresh[run], distance[run], m)
         if np.array_equal(fresh, labels):
             break
         labels = fresh
-        member = (labels == np.arange(m)[:, None]).astype(np.float64)
-        centres = (member @ rows) / member.sum(axis=1, keepdims=True)
-    return labels, float(np.square(rows - centres[labels]).sum())
+        member = (labels[:, None, :] == np.arange(m)[:, None]).astype(np.float64)
+        centres = (member @ rows) / member.sum(axis=2, keepdims=True)
+    cost = [float(np.square(rows - centre[label]).sum()) for centre, label in zip(centres, labels, strict=True)]
+    best: Labels = labels[int(np.argmin(np.round(cost, 12)))]
+    return best
 
 
-def _occupy(labels: Labels, distance: Floats, m: int) -> Labels:
+def _occupy(labels: Labels, distance: Floats, m: int) -> None:
     """Give every empty group the row that lies farthest from its own centre among those that can be spared."""
     sizes = np.bincount(labels, minlength=m)
+    if sizes.all():
+        return
     for empty in np.flatnonzero(sizes == 0):
         own = np.where(sizes[labels] > 1, distance[np.arange(len(labels)), labels], -np.inf)
         row = int(own.argmax())
         sizes[labels[row]] -= 1
         labels[row] = empty
         sizes[empty] = 1
-    return labels

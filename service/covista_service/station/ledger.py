@@ -122,16 +122,15 @@ class Ledger:
     def drop(self, code: str, count: int, *, counted: bool) -> None:
         """Messages that could not be read; `counted` if they were heard before.
 
-        Those are the announced ones; what was not announced had been taken for replaced.
+        Of those, one that was not announced has its fate already: it was a duplicate.
         """
-        self._dropped[code] += count
         if not counted:
             self._counts["received"] += count
+            self._dropped[code] += count
             return
-        announced = min(count, len(self._announced))
-        for message in list(self._announced)[:announced]:
+        for message in list(self._announced)[:count]:
             del self._announced[message]
-        self._counts["replaced"] -= count - announced
+            self._dropped[code] += 1
 
     def counts(self) -> Counts:
         """The accounts now."""
