@@ -124,7 +124,7 @@ def _part(name: str) -> str:
 
 def _read(report: type[_R], response: httpx.Response) -> _R:
     try:
-        return report.model_validate_json(response.content)
+        return report.read(response.content)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         detail = f"{'.'.join(str(part) for part in first['loc'])}: {first['msg']}"
@@ -133,7 +133,7 @@ def _read(report: type[_R], response: httpx.Response) -> _R:
 
 def _problem(response: httpx.Response) -> ApiError:
     try:
-        problem = Problem.model_validate_json(response.content)
+        problem = Problem.read(response.content)
     except ValidationError:
         return ApiError(f"{response.url} answered {response.status_code}", status=response.status_code)
     return ApiError(problem.title, status=response.status_code, detail=problem.detail)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import numpy as np
 from google.protobuf.message import DecodeError as ProtobufDecodeError
@@ -20,6 +20,8 @@ from covista_schemas import robot_pb2 as pb
 from covista_schemas.errors import DecodeError, KeyExpressionError
 from covista_schemas.messages import (
     DESCRIPTOR_BYTES,
+    MAX_FEATURES,
+    MAX_THUMBNAIL_BYTES,
     UNIT_TOLERANCE,
     Camera,
     Distortion,
@@ -28,11 +30,12 @@ from covista_schemas.messages import (
     Keyframe,
     Pose,
     PoseUpdate,
+    check_inside,
+    numbers,
 )
 
 KEYFRAME_ENCODING = "application/protobuf;covista.v1.Keyframe"
 POSE_ENCODING = "application/protobuf;covista.v1.Pose"
-MAX_FEATURES = 20_000
 
 MALFORMED = "malformed"
 WRONG_ID = "wrong_id"
@@ -101,11 +104,11 @@ def decode_keyframe(data: bytes, *, robot: str | None = None) -> Keyframe:
     features: Features | None = None
     thumbnail: bytes | None = None
     match message.WhichOneof("content"):
-        case "image":
+        case "image" if message.image:
             image = message.image
         case "features":
             features = _decode_features(message.features, camera)
-            thumbnail = message.features.thumbnail or None
+            thumbnail = _checked_thumbnail(message.features.thumbnail)
         case _:
             raise DecodeError(NO_CONTENT, "content", "neither an image nor features")
     return Keyframe(message.robot, message.boot, message.sequence, camera, pose, image, features, thumbnail)
@@ -196,9 +199,11 @@ def _encode_transform(pose: Pose) -> pb.Transform:
 
 def _decode_pose(message: pb.Keyframe | pb.Pose, covariance: tuple[float, ...]) -> Pose:
     if message.HasField("world_from_camera"):
-        position, orientation = _decode_transform(message.world_from_camera, "world_from_camera")
+        field = "world_from_camera"
+        position, orientation = _decode_transform(message.world_from_camera, field)
     elif message.HasField("world_from_body"):
-        outer = _decode_transform(message.world_from_body, "world_from_body")
+        field = "world_from_body"
+        outer = _decode_transform(message.world_from_body, field)
         has_mount = message.HasField("body_from_camera")
         inner = _decode_transform(message.body_from_camera, "body_from_camera") if has_mount else _NO_MOTION
         position, orientation = _compose(outer, inner)
@@ -207,7 +212,8 @@ def _decode_pose(message: pb.Keyframe | pb.Pose, covariance: tuple[float, ...]) 
     try:
         return Pose(position, orientation, message.time_ns, covariance)
     except ValueError as error:
-        raise DecodeError(BAD_POSE, "pose", str(error)) from error
+        name, _, reason = str(error).partition(": ")
+        raise DecodeError(BAD_POSE, name if name == "covariance" else f"{field}.{name}", reason) from error
 
 
 def _decode_transform(message: pb.Transform, field: str) -> tuple[_Vector, _Quaternion]:
@@ -216,30 +222,40 @@ def _decode_transform(message: pb.Transform, field: str) -> tuple[_Vector, _Quat
     norm = math.hypot(*orientation)
     if abs(norm - 1.0) > UNIT_TOLERANCE:
         raise DecodeError(BAD_POSE, f"{field}.orientation_xyzw", f"length {norm:.4g}, not 1")
-    x, y, z, w = (value / norm for value in orientation)
-    return (position[0], position[1], position[2]), (x, y, z, w)
+    unit = tuple(value / norm for value in orientation)
+    return cast(_Vector, position), cast(_Quaternion, unit)
 
 
-def _numbers(values: Sequence[float], count: int, field: str) -> Sequence[float]:
-    if len(values) != count:
-        raise DecodeError(BAD_POSE, field, f"{len(values)} numbers, not {count}")
-    if not all(math.isfinite(value) for value in values):
-        raise DecodeError(BAD_POSE, field, "numbers that are not finite")
-    return values
+def _numbers(values: Sequence[float], count: int, field: str) -> tuple[float, ...]:
+    try:
+        return numbers(field, values, count)
+    except ValueError as error:
+        raise DecodeError(BAD_POSE, field, str(error).partition(": ")[2]) from error
 
 
 def _compose(
     world_from_body: tuple[_Vector, _Quaternion], body_from_camera: tuple[_Vector, _Quaternion]
 ) -> tuple[_Vector, _Quaternion]:
-    """world_from_camera: rotations as quaternion products, p = p_wb + R_wb p_bc."""
-    (position, q), (lever, r) = world_from_body, body_from_camera
-    vector, scalar = np.array(q[:3]), q[3]
-    turned = np.cross(vector, lever) * 2.0
-    moved = np.array(position) + np.array(lever) + scalar * turned + np.cross(vector, turned)
-    xyz = scalar * np.array(r[:3]) + r[3] * vector + np.cross(vector, r[:3])
-    w = scalar * r[3] - float(vector @ np.array(r[:3]))
-    x, y, z = (float(value) for value in moved)
-    return (x, y, z), (float(xyz[0]), float(xyz[1]), float(xyz[2]), w)
+    """world_from_camera: p = p_wb + R_wb p_bc, and the product of the quaternions.
+
+    In plain numbers: for vectors of three, arrays cost ten times as much.
+    """
+    (p, (x, y, z, w)), (lever, (a, b, c, d)) = world_from_body, body_from_camera
+    # R v = v + 2 w (q x v) + 2 q x (q x v)
+    u = _cross((x, y, z), lever)
+    v = _cross((x, y, z), u)
+    position = tuple(p[i] + lever[i] + 2.0 * (w * u[i] + v[i]) for i in range(3))
+    orientation = (
+        w * a + d * x + y * c - z * b,
+        w * b + d * y + z * a - x * c,
+        w * c + d * z + x * b - y * a,
+        w * d - x * a - y * b - z * c,
+    )
+    return cast(_Vector, position), orientation
+
+
+def _cross(a: _Vector, b: _Vector) -> _Vector:
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 def _encode_features(features: Features, thumbnail: bytes | None) -> pb.Features:
@@ -268,12 +284,19 @@ def _decode_features(message: pb.Features, camera: Camera) -> Features:
     points = np.frombuffer(message.keypoints, "<f4").reshape(n, 2)
     try:
         features = Features.from_arrays(kind, points, _descriptors(kind, n, message.descriptors))
+        check_inside(features.keypoints_px, camera)
+    except DecodeError:
+        raise
     except ValueError as error:
-        raise DecodeError(BAD_FEATURES, "features", str(error)) from error
-    inside = (points >= -0.5).all() and (points[:, 0] < camera.width).all() and (points[:, 1] < camera.height).all()
-    if not inside:
-        raise DecodeError(BAD_FEATURES, "features.keypoints", f"points outside of {camera.width} x {camera.height} px")
+        name, _, reason = str(error).partition(": ")
+        raise DecodeError(BAD_FEATURES, f"features.{name}", reason) from error
     return features
+
+
+def _checked_thumbnail(data: bytes) -> bytes | None:
+    if len(data) > MAX_THUMBNAIL_BYTES:
+        raise DecodeError(BAD_IMAGE, "features.thumbnail", f"{len(data)} bytes, more than {MAX_THUMBNAIL_BYTES}")
+    return data or None
 
 
 def _descriptors(kind: FeatureKind, n: int, data: bytes) -> NDArray[np.generic]:

@@ -6,6 +6,7 @@ Frames: OpenCV camera axes (x right, y down, z forward); poses are of the camera
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated, Literal, Self
@@ -15,8 +16,11 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 UNIT_TOLERANCE = 1e-3
-_Finite = Annotated[float, Field(allow_inf_nan=False)]
-_Focal = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+# Bounds far beyond what makes sense, so that squares and ratios of what one robot says stay finite for all others.
+MAX_DISTANCE_M = 1e12
+_Coefficient = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
+_Focal = Annotated[float, Field(ge=0.1, le=1e6, allow_inf_nan=False)]
+_Centre = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 _Pixels = Annotated[int, Field(gt=0, le=65_535)]
 
 COEFFICIENT_COUNTS: dict[str, tuple[int, ...]] = {"none": (0,), "plumb_bob": (4, 5), "equidistant": (4,)}
@@ -42,7 +46,7 @@ class Distortion(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     model: Literal["none", "plumb_bob", "equidistant"] = "none"
-    coefficients: tuple[_Finite, ...] = ()
+    coefficients: tuple[_Coefficient, ...] = ()
 
     @model_validator(mode="after")
     def _count(self) -> Self:
@@ -60,8 +64,8 @@ class Camera(BaseModel):
 
     fx: _Focal
     fy: _Focal
-    cx: _Finite
-    cy: _Finite
+    cx: _Centre
+    cy: _Centre
     width: _Pixels
     height: _Pixels
     distortion: Distortion = Distortion()
@@ -72,7 +76,8 @@ class Pose:
     """Pose of a camera in the world: `position_m` and `orientation_xyzw` = world_from_camera, unit quaternion.
 
     `time_ns` is sensor time since the epoch. `covariance` is empty or 6 x 6, row-major, of (position m, rotation
-    vector rad) in the world frame. Raises ValueError for numbers that are not finite or a quaternion that is not unit.
+    vector rad) in the world frame. Sequences of any kind are taken. Raises ValueError that names what is wrong:
+    numbers that are not finite, a position beyond `MAX_DISTANCE_M`, a quaternion that is not unit.
     """
 
     position_m: tuple[float, float, float]
@@ -81,13 +86,17 @@ class Pose:
     covariance: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        _check_numbers("position_m", self.position_m, 3)
-        _check_numbers("orientation_xyzw", self.orientation_xyzw, 4)
+        for name, count in (("position_m", 3), ("orientation_xyzw", 4)):
+            object.__setattr__(self, name, numbers(name, getattr(self, name), count))
+        if len(self.covariance):
+            object.__setattr__(self, "covariance", numbers("covariance", self.covariance, 36))
+        if max(map(abs, self.position_m)) > MAX_DISTANCE_M:
+            raise ValueError(f"position_m: farther than {MAX_DISTANCE_M:.0e} m from the origin")
         norm = math.hypot(*self.orientation_xyzw)
         if abs(norm - 1.0) > UNIT_TOLERANCE:
-            raise ValueError(f"orientation_xyzw has length {norm:.4g}, not 1")
-        if self.covariance:
-            _check_numbers("covariance", self.covariance, 36)
+            raise ValueError(f"orientation_xyzw: length {norm:.4g}, not 1")
+        if not (isinstance(self.time_ns, int | np.integer) and -(2**63) <= self.time_ns < 2**63):
+            raise ValueError(f"time_ns: {self.time_ns!r} is not a whole number of 64 bits")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,18 +118,22 @@ class Features:
         cls, kind: FeatureKind | str, keypoints_px: NDArray[np.generic], descriptors: NDArray[np.generic]
     ) -> Self:
         """Check shapes, quantise float RootSIFT descriptors, and raise ValueError for what does not fit."""
+        if kind not in tuple(FeatureKind):
+            raise ValueError(f"kind: {kind!r:.40}, not one of {', '.join(FeatureKind)}")
         kind = FeatureKind(kind)
         points = np.ascontiguousarray(keypoints_px, np.float32)
         if points.ndim != 2 or points.shape[1] != 2:
-            raise ValueError(f"keypoints_px has shape {points.shape}, not (n, 2)")
+            raise ValueError(f"keypoints: shape {points.shape}, not (n, 2)")
         if not np.isfinite(points).all():
-            raise ValueError("keypoints_px has numbers that are not finite")
+            raise ValueError("keypoints: numbers that are not finite")
+        if len(points) > MAX_FEATURES:
+            raise ValueError(f"keypoints: {len(points)} points, more than {MAX_FEATURES}")
         expected = (len(points), DESCRIPTOR_BYTES[kind])
         if descriptors.shape != expected:
-            raise ValueError(f"descriptors have shape {descriptors.shape}, not {expected}")
+            raise ValueError(f"descriptors: shape {descriptors.shape}, not {expected}")
         if descriptors.dtype != np.uint8:
             if kind is not FeatureKind.ROOTSIFT:
-                raise ValueError(f"{kind} descriptors are uint8, not {descriptors.dtype}")
+                raise ValueError(f"descriptors: of {kind} they are uint8, not {descriptors.dtype}")
             descriptors = quantise_rootsift(descriptors)
         return cls(kind, points, np.ascontiguousarray(descriptors, np.uint8))
 
@@ -160,7 +173,7 @@ def quantise_rootsift(descriptors: NDArray[np.generic]) -> NDArray[np.uint8]:
     """RootSIFT (n, 128) in [0, 1] as bytes, 512 standing for 1; raises ValueError where not finite."""
     values = np.asarray(descriptors, np.float32)
     if not np.isfinite(values).all():
-        raise ValueError("descriptors have numbers that are not finite")
+        raise ValueError("descriptors: numbers that are not finite")
     scaled: NDArray[np.uint8] = np.clip(np.rint(values * ROOTSIFT_SCALE), 0, 255).astype(np.uint8)
     return scaled
 
@@ -169,11 +182,17 @@ def check_inside(keypoints_px: NDArray[np.float32], camera: Camera) -> None:
     """Raise ValueError unless all points (n, 2) lie in the camera's image."""
     high = np.array([camera.width, camera.height]) - 0.5
     if not ((keypoints_px >= -0.5) & (keypoints_px <= high)).all():
-        raise ValueError(f"points outside of {camera.width} x {camera.height} px")
+        raise ValueError(f"keypoints: points outside of {camera.width} x {camera.height} px")
 
 
-def _check_numbers(name: str, values: tuple[float, ...], count: int) -> None:
+def numbers(name: str, values: Sequence[float], count: int) -> tuple[float, ...]:
+    """`count` finite numbers as floats; ValueError that names them otherwise."""
     if len(values) != count:
-        raise ValueError(f"{name} has {len(values)} numbers, not {count}")
-    if not all(math.isfinite(value) for value in values):
-        raise ValueError(f"{name} has numbers that are not finite")
+        raise ValueError(f"{name}: {len(values)} numbers, not {count}")
+    try:
+        taken = tuple(float(value) for value in values)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name}: {values!r:.80} are not numbers") from None
+    if not all(map(math.isfinite, taken)):
+        raise ValueError(f"{name}: numbers that are not finite")
+    return taken

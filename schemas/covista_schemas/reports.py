@@ -31,9 +31,14 @@ def time_of(time_ns: int) -> datetime:
 
 
 class Report(BaseModel):
-    """What all answers share: frozen; readers ignore fields that they do not know."""
+    """What all answers share: frozen, and no number that is not finite."""
 
-    model_config = ConfigDict(frozen=True)
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False)
+
+    @classmethod
+    def read(cls, data: bytes | str) -> Self:
+        """The report in JSON; what only later versions of the station say is passed over. Raises ValidationError."""
+        return cls.model_validate_json(data, extra="ignore")
 
 
 class Status(StrEnum):

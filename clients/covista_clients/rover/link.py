@@ -54,6 +54,7 @@ class RoverLink:
         self._session = session
         self._site, self._robot, self._boot = site, robot, boot
         self._owned = owned
+        self._closed = False
         # Keyframes give way to poses, and a congested link drops them at the source instead of holding up the robot.
         self._keyframes = session.declare_publisher(
             keys.keyframe(site, robot),
@@ -106,7 +107,7 @@ class RoverLink:
         subscriber = zenoh.ext.declare_advanced_subscriber(
             self._session,
             keys.own_group(self._site, self._robot),
-            lambda sample: _tell(callback, sample.payload.to_bytes()),
+            lambda sample: self._tell(callback, sample.payload.to_bytes()),
             history=zenoh.ext.HistoryConfig(detect_late_publishers=True),
         )
         self._undo.append(subscriber.undeclare)
@@ -127,10 +128,21 @@ class RoverLink:
 
     def close(self) -> None:
         """Take everything back."""
+        self._closed = True
         for undo in reversed(self._undo):
             undo()
         if self._owned:
             self._session.close()
+
+    def _tell(self, callback: OnGroup, data: bytes) -> None:
+        # What was queued before closing still comes after it.
+        if self._closed:
+            return
+        try:
+            callback(OwnGroupReport.read(data))
+        except Exception:
+            # Whatever the rover's own code raises must not end the subscription.
+            logger.exception("a callback of on_group failed")
 
 
 def _has_listeners(publisher: zenoh.Publisher) -> bool:
@@ -144,7 +156,7 @@ def ask_report(session: zenoh.Session, site: str, robot: str, timeout_s: float) 
     for reply in session.get(keys.robot_report(site, robot), timeout=timeout_s):
         if reply.ok is not None:
             try:
-                return RobotReport.model_validate_json(reply.ok.payload.to_bytes())
+                return RobotReport.read(reply.ok.payload.to_bytes())
             except ValidationError as error:
                 raise LinkError(f"the station's report on {robot} cannot be read: {error}") from error
     return None
@@ -154,11 +166,3 @@ def has_heard(report: RobotReport, keyframe: KeyframeId) -> bool:
     """Whether the station has received this keyframe or a later one of the same boot, usable or not."""
     known = (report.heard, report.keyframe)
     return any(k is not None and k.boot == keyframe.boot and k.sequence >= keyframe.sequence for k in known)
-
-
-def _tell(callback: OnGroup, data: bytes) -> None:
-    try:
-        callback(OwnGroupReport.model_validate_json(data))
-    except Exception:
-        # Whatever the rover's own code raises must not end the subscription.
-        logger.exception("a callback of on_group failed")
