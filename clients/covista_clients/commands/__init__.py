@@ -1,0 +1,1 @@
+"""What `covista` can be told to do, one function per command."""

@@ -1,0 +1,87 @@
+"""Simulated rovers, and rendered worlds on disk."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from covista_schemas.errors import CovistaError, MissingExtraError
+from covista_schemas.zenoh_config import check_endpoint
+
+from covista_clients.commands.interrupting import ends_by_interrupt
+from covista_clients.commands.options import DEFAULT_CONNECT, Connect, Site
+from covista_clients.rover import Send
+
+if TYPE_CHECKING:
+    from covista_clients.simulation.swarm import Progress, SwarmOptions
+
+WorldName = Annotated[str, typer.Option("--world", help="corner, boxes, shelf, wall or arena.")]
+
+
+def swarm(
+    robots: Annotated[int, typer.Option(min=1, help="How many rovers.")] = 6,
+    world: WorldName = "arena",
+    seed: Annotated[int, typer.Option(help="The same seed gives the same swarm.")] = 0,
+    rate: Annotated[float, typer.Option(help="Keyframes per second and rover.")] = 2.0,
+    connect: Connect = DEFAULT_CONNECT,
+    site: Site = "default",
+    send: Annotated[Send, typer.Option(help="What the rovers make of their pictures.")] = Send.IMAGE,
+    seconds: Annotated[float | None, typer.Option(min=0, help="End after so many seconds.")] = None,
+) -> None:
+    """Drive simulated rovers through a rendered world, until Ctrl-C."""
+    check_endpoint(connect)
+    with _simulation("covista swarm"):
+        from covista_clients.simulation.swarm import SwarmOptions
+
+        options = SwarmOptions(
+            robots=robots, world=world, seed=seed, rate_hz=rate, connect=connect, site=site, send=send.value
+        )
+    print(f"{robots} rovers in {world} send to {connect}; Ctrl-C ends.", file=sys.stderr)
+    progress = _run(options, seconds)
+    print(f"{progress.keyframes} keyframes and {progress.poses} poses, {progress.skipped} skipped", file=sys.stderr)
+
+
+def render(
+    world: Annotated[str, typer.Argument(help="corner, boxes, shelf, wall or arena.")],
+    out: Annotated[Path, typer.Option(help="Folder to write into; made if it is not there.", file_okay=False)],
+    cameras: Annotated[int, typer.Option(min=1, help="How many views.")] = 6,
+    seed: Annotated[int, typer.Option(help="The same seed gives the same folder.")] = 0,
+) -> None:
+    """Write views of a rendered world with exact depth and true overlap into a folder."""
+    with _simulation("covista render"):
+        from covista_clients.simulation import folder, worlds
+
+        folder.write(worlds.build(world, seed), cameras, seed, out)
+    print(f"{cameras} views of {world} in {out}", file=sys.stderr)
+
+
+@contextmanager
+def _simulation(command: str) -> Iterator[None]:
+    """Say in one line what is wrong with what was asked for, or what to install."""
+    try:
+        yield
+    except ImportError as error:
+        if error.name != "cv2":
+            raise
+        raise MissingExtraError(command, "vision") from error
+    except (ValueError, OSError) as error:
+        raise CovistaError(str(error)) from error
+
+
+def _run(options: SwarmOptions, seconds: float | None) -> Progress:
+    """Run a swarm in a thread of its own, so that Ctrl-C finds the main one waiting and the rovers leave in order."""
+    from covista_clients.simulation.swarm import run_swarm
+
+    stop = threading.Event()
+    with ThreadPoolExecutor(1, "swarm") as pool:
+        running = pool.submit(run_swarm, options, stop, seconds=seconds)
+        with ends_by_interrupt():
+            wait([running])
+        stop.set()
+        return running.result()
