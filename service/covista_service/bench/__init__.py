@@ -1,0 +1,1 @@
+"""Benchmarks with marks to hold, beside what others offer: `covista-station bench`."""

@@ -1,0 +1,35 @@
+"""The swarm's process: rovers in a rendered world, told by the parent when to fall silent and when to leave."""
+
+from __future__ import annotations
+
+import threading
+from typing import Literal
+
+from covista_clients.simulation.swarm import KeyframeRecord, SwarmOptions, run_swarm
+
+from covista_service.demo.children import Line, end_soon
+
+Order = Literal["quiet", "leave"]
+
+
+def play(line: Line, options: SwarmOptions) -> None:
+    """Drive; every keyframe that was put goes to the parent as a KeyframeRecord, and at the end `None`."""
+    quiet, leave = threading.Event(), threading.Event()
+    listener = threading.Thread(target=_obey, args=(line, quiet, leave), name="orders", daemon=True)
+    listener.start()
+
+    def report(record: KeyframeRecord) -> None:
+        line.send(record)
+
+    run_swarm(options, quiet, on_keyframe=report, leave=leave)
+
+
+def _obey(line: Line, quiet: threading.Event, leave: threading.Event) -> None:
+    """Pass orders on; a line that closes is the order to leave, at once."""
+    while (order := line.receive()) is not None:
+        quiet.set()
+        if order == "leave":
+            leave.set()
+    end_soon()
+    quiet.set()
+    leave.set()
