@@ -10,10 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from covista_service.perception.camera import Floats
 
 _TINY = 1e-12
+Cells = NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +31,7 @@ class FuzzyOptions:
     delta_px: float = 2.0
     floor: float = 0.5
     initial_iterations: int = 8
+    triples: int = 30
     iterations: int = 6
     settled: float = 0.02
 
@@ -50,29 +53,57 @@ class Points:
         return away
 
 
-def cluster(points: Points, options: FuzzyOptions, random: np.random.Generator) -> Floats:
-    """Planes c (K, 3) that the points lie on, as far as clustering finds them; K may be 0."""
-    wanted = min(options.max_clusters, len(points) // options.points_per_cluster)
-    if not wanted:
-        return np.zeros((0, 3))
-    memberships = initial_memberships(points, wanted, options, random)
-    while True:
+def cluster(points: Points, options: FuzzyOptions, random: np.random.Generator) -> list[Floats]:
+    """Planes c (K, 3) that the points lie on, after each merging: from many down to those that are left at the end."""
+    planes = _robust_planes(points, initial_cells(points, options, random), options, random)
+    stages = [planes]
+    memberships: Floats | None = noise_memberships(points.distances(planes), options)
+    while memberships is not None and memberships.shape[1]:
         memberships, planes = _settle(points, memberships, options)
-        merged = merge_most_similar(memberships)
-        if merged is None:
-            return planes
-        memberships = merged
+        stages.append(planes)
+        memberships = merge_most_similar(memberships)
+    return stages
 
 
-def initial_memberships(points: Points, count: int, options: FuzzyOptions, random: np.random.Generator) -> Floats:
-    """Memberships (n, count) of fuzzy c-means (1), (2) with m = 2, over place in the image and inverse depth."""
+def initial_cells(points: Points, options: FuzzyOptions, random: np.random.Generator) -> Cells:
+    """The cell (n,) that fuzzy c-means (1), (2) with m = 2 puts each point in, by pixel and inverse depth."""
+    count = min(options.max_clusters, len(points) // options.points_per_cluster)
     place = np.column_stack((points.rays[:, :2], points.inverse_depths))
     place = (place - place.mean(axis=0)) / (place.std(axis=0) + _TINY)
     centres = place[random.choice(len(place), count, replace=False)]
     for _ in range(options.initial_iterations):
         weights = _fuzzy_memberships(_squared_gaps(place, centres)) ** 2
         centres = (weights.T @ place) / (weights.sum(axis=0)[:, None] + _TINY)  # (1)
-    return _fuzzy_memberships(_squared_gaps(place, centres))
+    cells: Cells = _squared_gaps(place, centres).argmin(axis=1)
+    return cells
+
+
+def _robust_planes(points: Points, cells: Cells, options: FuzzyOptions, random: np.random.Generator) -> Floats:
+    """For each cell with enough points the plane c (K, 3) through three of them that most others of the cell lie near.
+
+    Least squares would let one outlier among a cell's few points spoil its first plane for good.
+    """
+    members = [np.flatnonzero(cells == cell) for cell in np.unique(cells)]
+    members = [own for own in members if len(own) >= 3]
+    planes = []
+    for own in members:
+        triples = own[random.integers(len(own), size=(options.triples, 3))]
+        proposed = _through(points, triples)
+        if len(proposed):
+            away = Points(points.rays[own], points.inverse_depths[own], points.shifts_px[own]).distances(proposed)
+            planes.append(proposed[np.minimum(away, options.delta_px).sum(axis=0).argmin()])
+    return np.array(planes).reshape(-1, 3)
+
+
+def _through(points: Points, triples: NDArray[np.intp]) -> Floats:
+    """Planes c (k, 3) through triples (m, 3) of points, k <= m of which are not in line."""
+    one, two, three = np.moveaxis(points.rays[triples], 1, 0)
+    rho = points.inverse_depths[triples]
+    turns = np.stack((np.cross(two, three), np.cross(three, one), np.cross(one, two)), axis=1)
+    determinant = (one * turns[:, 0]).sum(axis=1)
+    fixed = np.abs(determinant) > _TINY
+    planes: Floats = (rho[:, :, None] * turns).sum(axis=1)[fixed] / determinant[fixed, None]
+    return planes
 
 
 def noise_memberships(distances: Floats, options: FuzzyOptions) -> Floats:

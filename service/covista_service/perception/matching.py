@@ -18,7 +18,7 @@ Indices = NDArray[np.intp]
 class MatchingOptions:
     """`ratio` of the best to the second best distance (Lowe, IJCV 2004) that a match may have at most."""
 
-    rootsift_ratio: float = 0.8
+    rootsift_ratio: float = 0.9
     orb_ratio: float = 0.85
 
 

@@ -24,20 +24,30 @@ class CommonField:
     regions_second: tuple[Polygon, ...]
 
 
-def common_field(first: Camera, second: Camera, rotation: Floats, translation: Floats, normals: Floats) -> CommonField:
+def common_field(
+    first: Camera,
+    second: Camera,
+    rotation: Floats,
+    translation: Floats,
+    normals: Floats,
+    orders: tuple[Floats | None, Floats | None] = (None, None),
+) -> CommonField:
     """What both cameras see of the planes u . X + 1 = 0, `normals` u (K, 3) in the first camera's frame, X_2 = R X + t.
 
-    Each camera sees the nearest plane along each of its rays. Every condition is linear in the pixel of the first
-    image, so each plane's common region is one convex polygon there, and cutting before mapping never meets a horizon.
+    A pixel v of either image shows the plane whose row of its order (K, 3) gives the largest row . v; without an order
+    the nearest, whose inverse depth is the largest. Every condition is linear in the pixel of the first image, so
+    each plane's common region is one convex polygon there, and cutting before mapping never meets a horizon.
     """
     pixels_to_rays = np.linalg.inv(first.matrix)
     homographies = homographies_of(first, second, rotation, translation, normals)
     rho_first = -normals @ pixels_to_rays
-    rho_second, same_side = _inverse_depths_second(second, rotation, translation, normals)
+    rho_second, same_side = inverse_depths_second(second, rotation, translation, normals)
+    order_first = rho_first if orders[0] is None else orders[0]
+    order_second = rho_second if orders[1] is None else orders[1]
     regions_first: list[Polygon] = []
     regions_second: list[Polygon] = []
     for k, homography in enumerate(homographies):
-        conditions = _conditions(k, homography, second, rho_first, rho_second)
+        conditions = _conditions(k, homography, second, rho_first[k], order_first, order_second)
         image = polygon.rectangle(first.width, first.height) if same_side[k] else []
         region = polygon.cut(image, conditions)
         regions_first.append(region)
@@ -58,7 +68,7 @@ def homographies_of(first: Camera, second: Camera, rotation: Floats, translation
     return homographies
 
 
-def _inverse_depths_second(
+def inverse_depths_second(
     second: Camera, rotation: Floats, translation: Floats, normals: Floats
 ) -> tuple[Floats, list[bool]]:
     """Inverse depth (K, 3) of each plane as a linear function of the second image's pixel; does it show the same side?
@@ -73,19 +83,21 @@ def _inverse_depths_second(
     return rho, (side >= _EDGE_ON).tolist()
 
 
-def _conditions(k: int, homography: Floats, second: Camera, rho_first: Floats, rho_second: Floats) -> list[list[float]]:
+def _conditions(
+    k: int, homography: Floats, second: Camera, rho: Floats, order_first: Floats, order_second: Floats
+) -> list[list[float]]:
     """What a pixel v of the first image must fulfil to show plane k in both images, each row . v >= 0."""
-    others = np.arange(len(rho_first)) != k
+    others = np.arange(len(order_first)) != k
     x, y, w = homography
     rows = np.vstack(
         (
-            rho_first[k],
-            rho_first[k] - rho_first[others],
+            rho,
+            order_first[k] - order_first[others],
             x + 0.5 * w,
             (second.width - 0.5) * w - x,
             y + 0.5 * w,
             (second.height - 0.5) * w - y,
-            (rho_second[k] - rho_second[others]) @ homography,
+            (order_second[k] - order_second[others]) @ homography,
         )
     )
     conditions: list[list[float]] = rows.tolist()

@@ -27,6 +27,7 @@ class PlaneOptions:
     outlier_range_px: float = 100.0
     restarts: int = 3
     min_support: int = 6
+    price: float = 0.7
     thinnest: float = 0.03
     refits: int = 3
 
@@ -49,18 +50,44 @@ def find_planes(points: Points, options: PlaneOptions, seed: int, known: Floats 
     random = np.random.default_rng(seed)
     if len(points) < options.min_support:
         return FoundPlanes(np.zeros((0, 3)), np.full(len(points), _OUTLIER))
-    starts = [] if known is None or not len(known) else [known]
-    starts += [cluster(points, options.fuzzy, random) for _ in range(options.restarts)]
-    candidates = [_pruned(points, planes, options) for planes in starts]
-    best = min(candidates, key=lambda planes: description_length(points, planes, options))
-    return _by_support(points, best, options)
+    proposed = [np.zeros((0, 3)) if known is None else known]
+    for _ in range(options.restarts):
+        proposed += cluster(points, options.fuzzy, random)
+    chosen = _chosen(points, np.vstack(proposed), options)
+    return _by_support(points, _pruned(points, chosen, options), options)
+
+
+def _chosen(points: Points, proposed: Floats, options: PlaneOptions) -> Floats:
+    """Planes (K, 3) out of many, each in turn the one that shortens the description most."""
+    costs = _costs(points, proposed, options)
+    remaining, price = costs[:, 0], _price(points, options)
+    picked: list[int] = []
+    while len(picked) < options.fuzzy.max_clusters:
+        gains = np.maximum(remaining[:, None] - costs[:, 1:], 0.0).sum(axis=0)
+        best = int(gains.argmax()) if len(gains) else 0
+        if not len(gains) or gains[best] <= price:
+            break
+        picked.append(best)
+        remaining = np.minimum(remaining, costs[:, 1 + best])
+    return proposed[picked]
 
 
 def description_length(points: Points, planes: Floats, options: PlaneOptions) -> float:
-    """Nats that it takes to tell where all points are: planes, which point lies on which, and what remains."""
+    """Nats that it takes to tell the planes, and where all points are.
+
+    Which point lies on which plane comes free: neighbours mostly lie on the same.
+    """
     costs = _costs(points, planes, options)
-    parameters = 1.5 * np.log(len(points)) * len(planes)
-    return float(costs.min(axis=1).sum() + parameters)
+    return float(costs.min(axis=1).sum() + _price(points, options) * len(planes))
+
+
+def _price(points: Points, options: PlaneOptions) -> float:
+    """Nats to tell a plane: name three of its points, and tell each of them as an outlier."""
+    return float(options.price * 3 * (np.log(len(points)) + _outlier_cost(options)))
+
+
+def _outlier_cost(options: PlaneOptions) -> float:
+    return float(np.log(options.outlier_range_px / (options.noise_px * np.sqrt(2 * np.pi))))
 
 
 def assign(points: Points, planes: Floats, options: PlaneOptions) -> Labels:
@@ -71,9 +98,8 @@ def assign(points: Points, planes: Floats, options: PlaneOptions) -> Labels:
 
 def _costs(points: Points, planes: Floats, options: PlaneOptions) -> Floats:
     """Nats (n, 1 + K) for each point as an outlier or on a plane."""
-    outlier = np.log(options.outlier_range_px / (options.noise_px * np.sqrt(2 * np.pi)))
-    on_plane = points.distances(planes) ** 2 / (2 * options.noise_px**2) + np.log(max(len(planes), 1))
-    return np.column_stack((np.full(len(points), outlier), on_plane))
+    on_plane = points.distances(planes) ** 2 / (2 * options.noise_px**2)
+    return np.column_stack((np.full(len(points), _outlier_cost(options)), on_plane))
 
 
 def _pruned(points: Points, planes: Floats, options: PlaneOptions) -> Floats:

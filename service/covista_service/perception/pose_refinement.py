@@ -116,6 +116,6 @@ def _deviation_slopes(pose: Refined, prior: PosePrior) -> Floats:
 
 def _tangents(direction: Floats) -> Floats:
     """Two unit vectors (3, 2) across a unit vector and each other."""
-    aside: Floats = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))]).astype(np.float64)
-    aside = aside / np.linalg.norm(aside)
+    across = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
+    aside = across / np.linalg.norm(across)
     return np.column_stack((aside, np.cross(direction, aside)))

@@ -8,13 +8,14 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from covista_service.perception.camera import Floats, View, relative, undistort
+from covista_service.perception.camera import Camera, Floats, View, relative, undistort
 from covista_service.perception.fuzzy import Points
 from covista_service.perception.matching import MatchingOptions, match
-from covista_service.perception.overlap import common_field
-from covista_service.perception.planes import PlaneOptions, find_planes
+from covista_service.perception.overlap import common_field, inverse_depths_second
+from covista_service.perception.planes import FoundPlanes, PlaneOptions, find_planes
 from covista_service.perception.polygon import corners
 from covista_service.perception.relative_pose import PoseSource, RelativePoseOptions, Sightings, relative_pose
+from covista_service.perception.territories import TerritoryOptions, territories
 from covista_service.perception.triangulation import TriangulationOptions, triangulate
 
 
@@ -73,6 +74,19 @@ class SurveyOptions:
     pose: RelativePoseOptions = field(default_factory=RelativePoseOptions)
     triangulation: TriangulationOptions = field(default_factory=TriangulationOptions)
     planes: PlaneOptions = field(default_factory=PlaneOptions)
+    territories: TerritoryOptions = field(default_factory=TerritoryOptions)
+
+
+def seen_orders(
+    first: Camera, second: Camera, found: Survey, planes: FoundPlanes, options: TerritoryOptions
+) -> tuple[Floats, Floats]:
+    """Which plane a pixel of either image shows."""
+    nearest_first = -planes.normals @ np.linalg.inv(first.matrix)
+    nearest_second, _ = inverse_depths_second(second, found.rotation, found.translation, planes.normals)
+    return (
+        territories(found.points_first_px, planes.labels, nearest_first, options),
+        territories(found.points_second_px, planes.labels, nearest_second, options),
+    )
 
 
 def survey(first: View, second: View, options: SurveyOptions, prior: Survey | None = None) -> Survey:
@@ -133,7 +147,8 @@ def survey(first: View, second: View, options: SurveyOptions, prior: Survey | No
         return replace(found, outcome=Outcome.NO_PLANE)
 
     # the common field of view is what both cameras see of those planes.
-    field_of_view = common_field(first.camera, second.camera, pose.rotation, pose.translation, planes.normals)
+    orders = seen_orders(first.camera, second.camera, found, planes, options.territories)
+    field_of_view = common_field(first.camera, second.camera, pose.rotation, pose.translation, planes.normals, orders)
     return replace(
         found,
         outcome=Outcome.MEASURED,
