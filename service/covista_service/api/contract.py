@@ -1,0 +1,56 @@
+"""The OpenAPI description, with problems under the media type that they are sent with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from covista_schemas.reports import Problem
+from fastapi import FastAPI
+from fastapi.openapi.utils import get_openapi
+
+from covista_service.api.errors import PROBLEM_JSON
+
+Description = dict[str, Any]
+_PROBLEM = {"$ref": "#/components/schemas/Problem"}
+_UNUSED = ("HTTPValidationError", "ValidationError")
+
+
+def describe(app: FastAPI) -> Callable[[], Description]:
+    """A function that gives the app's description, made once."""
+
+    def openapi() -> Description:
+        if app.openapi_schema is None:
+            app.openapi_schema = _corrected(
+                get_openapi(
+                    title=app.title,
+                    version=app.version,
+                    description=app.description,
+                    routes=app.routes,
+                    openapi_version="3.1.0",
+                )
+            )
+        return app.openapi_schema
+
+    return openapi
+
+
+def _corrected(description: Description) -> Description:
+    for status, response in _responses(description):
+        content = response.get("content", {})
+        if status == "422":
+            response["description"] = "Malformed request"
+            response["content"] = {PROBLEM_JSON: {"schema": _PROBLEM}}
+        elif content.get("application/json", {}).get("schema") == _PROBLEM:
+            response["content"] = {PROBLEM_JSON: content["application/json"]}
+    schemas = description["components"]["schemas"]
+    schemas.setdefault("Problem", Problem.model_json_schema())
+    for name in _UNUSED:
+        schemas.pop(name, None)
+    return description
+
+
+def _responses(description: Description) -> Iterator[tuple[str, Description]]:
+    for path in description["paths"].values():
+        for operation in path.values():
+            yield from operation["responses"].items()

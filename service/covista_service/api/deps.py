@@ -1,0 +1,68 @@
+"""What routes are given: the parts of the station, and its snapshot."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, TypedDict
+
+from covista_schemas.keys import ID_PATTERN
+from covista_schemas.reports import Health, Report
+from fastapi import Depends, Path, Request, Response
+
+from covista_service.loop import Loop
+from covista_service.station.snapshot import Snapshot
+from covista_service.telemetry import Telemetry
+
+JSON = "application/json"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Parts:
+    """What the routes need of the station. `name` changes with each start, so that no answer is mistaken for newer."""
+
+    loop: Loop
+    telemetry: Telemetry
+    health: Callable[[], Health]
+    turned_away: Callable[[], dict[str, int]]
+    name: str
+
+
+class State(TypedDict):
+    """The application's state, as yielded by its lifespan."""
+
+    parts: Parts
+
+
+def parts_of(request: Request) -> Parts:
+    """The parts of the station."""
+    state: State = request.scope["state"]
+    return state["parts"]
+
+
+PartsNow = Annotated[Parts, Depends(parts_of)]
+
+
+async def snapshot_of(parts: PartsNow) -> Snapshot:
+    """The station now. Asynchronous, so that it runs in the loop's own thread; the answer is built in another."""
+    return parts.loop.snapshot()
+
+
+SnapshotNow = Annotated[Snapshot, Depends(snapshot_of)]
+RobotPath = Annotated[str, Path(pattern=f"^{ID_PATTERN}$", description="Id of a robot.", examples=["r1"])]
+
+
+def answer(report: Report) -> Response:
+    """A report as it is: it was checked when it was made."""
+    return Response(report.model_dump_json(), media_type=JSON)
+
+
+def answer_unless_known(request: Request, tag: str, build: Callable[[], Response]) -> Response:
+    """304 for who has this version already (RFC 9110, If-None-Match), else what `build` makes, with its tag."""
+    etag = f'"{hashlib.blake2s(tag.encode(), digest_size=12).hexdigest()}"'
+    known = [each.strip().removeprefix("W/") for each in request.headers.get("if-none-match", "").split(",")]
+    response = Response(status_code=304) if etag in known or known == ["*"] else build()
+    response.headers["ETag"] = etag
+    response.headers["Vary"] = "Accept"
+    return response

@@ -1,0 +1,32 @@
+"""How the station is: for who restarts it, for who sends it work, and for Prometheus."""
+
+from __future__ import annotations
+
+from covista_schemas.reports import Health
+from fastapi import APIRouter, Response
+from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
+
+from covista_service.api import examples
+from covista_service.api.deps import PartsNow, SnapshotNow, answer
+from covista_service.api.metrics import of_station
+
+router = APIRouter(tags=["health"])
+_WORKING = ("ready", "degraded")
+_RESPONSES = {**examples.show(examples.HEALTH), 503: {"model": Health, "description": "Starting or stopping"}}
+
+
+@router.get("/healthz", response_model=Health, responses=_RESPONSES)
+@router.get("/readyz", response_model=Health, responses=_RESPONSES)
+async def health(parts: PartsNow) -> Response:
+    """The station and its parts; degraded parts do not stop it."""
+    found = parts.health()
+    response = answer(found)
+    response.status_code = 200 if found.status in _WORKING else 503
+    return response
+
+
+@router.get("/metrics", response_class=Response, responses={200: {"content": {"text/plain": {}}}})
+def metrics(parts: PartsNow, snapshot: SnapshotNow) -> Response:
+    """Counts and latencies for Prometheus."""
+    text = generate_latest(parts.telemetry.registry) + generate_latest(of_station(snapshot, parts.turned_away()))
+    return Response(text, media_type=CONTENT_TYPE_LATEST)

@@ -1,0 +1,69 @@
+"""Pairs of robots: what both see."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from covista_schemas.reports import PairReport, PairsReport
+from fastapi import APIRouter, Query, Response
+
+from covista_service import answers
+from covista_service.answers import NotKnownError
+from covista_service.api import examples
+from covista_service.api.deps import RobotPath, SnapshotNow, answer
+from covista_service.api.errors import describe
+from covista_service.drawing import CommonField, overlay
+from covista_service.station.snapshot import PairView
+
+router = APIRouter(prefix="/pairs", tags=["pairs"])
+
+_PICTURE: dict[int | str, dict[str, Any]] = {
+    200: {"content": {"image/png": {"schema": {"type": "string", "format": "binary"}}}}
+}
+RobotQuery = Annotated[RobotPath | None, Query(description="Only pairs of this robot.")]
+ShareQuery = Annotated[
+    float | None, Query(ge=0, le=1, description="Only pairs where one sees at least this share of the other's image.")
+]
+
+
+@router.get("", response_model=PairsReport, responses={**examples.show(examples.PAIRS), **describe(404)})
+def pairs(snapshot: SnapshotNow, robot: RobotQuery = None, min_overlap: ShareQuery = None) -> Response:
+    """All pairs, each unordered pair once."""
+    return answer(answers.pairs_report(snapshot, robot, min_overlap))
+
+
+@router.get("/{a}/{b}", response_model=PairReport, responses={**examples.show(examples.PAIR), **describe(404)})
+def pair(a: RobotPath, b: RobotPath, snapshot: SnapshotNow) -> Response:
+    """One pair in full, in the order asked for; perhaps `unknown`, with null overlaps."""
+    return answer(answers.pair_report(snapshot, a, b))
+
+
+@router.get("/{a}/{b}/overlay.png", response_class=Response, responses={**_PICTURE, **describe(404)})
+def overlay_picture(a: RobotPath, b: RobotPath, snapshot: SnapshotNow, side: Literal["a", "b"] = "a") -> Response:
+    """The common field drawn in the keyframe of one side: what the other does not see is dimmed."""
+    drawn, other = (a, b) if side == "a" else (b, a)
+    return Response(_draw(answers.find_pair(snapshot, drawn, other), drawn, other), media_type="image/png")
+
+
+def _draw(view: PairView, drawn: str, other: str) -> bytes:
+    first = drawn == view.a
+    keyframe = view.keyframe_a if first else view.keyframe_b
+    if keyframe is None:
+        raise NotKnownError("No picture", f"what {drawn!r} and {other!r} have in common is not known yet")
+    share = view.overlap_a if first else view.overlap_b
+    words = "unknown" if share is None else f"{share:.0%}"
+    caption = (
+        f"{drawn} #{keyframe.id.sequence}: {words} of it seen by {other} ({view.found_by}, {view.inliers} inliers)"
+    )
+    return overlay(keyframe, _common_field(view, first=first), caption)
+
+
+def _common_field(view: PairView, *, first: bool) -> CommonField | None:
+    survey = answers.explaining_survey(view)
+    if survey is None:
+        return None
+    return CommonField(
+        tuple(plane.region_first if first else plane.region_second for plane in survey.planes),
+        survey.points_first_px if first else survey.points_second_px,
+        tuple(survey.plane_of_point.tolist()),
+    )

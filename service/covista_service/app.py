@@ -1,0 +1,140 @@
+"""The one composition root: builds the station from its settings, opens its parts in order, closes them in reverse."""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+from collections.abc import AsyncIterator, Callable
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from importlib.metadata import version
+
+from covista_schemas.reports import GroupBounds, Health, LiveSettings, PartHealth
+from fastapi import APIRouter, FastAPI
+
+from covista_service.access import check_listening
+from covista_service.api import contract, errors, groups, health, pairs, robots, similarity
+from covista_service.api.deps import Parts, State
+from covista_service.config import Settings
+from covista_service.link.inbox import Inbox
+from covista_service.link.ingest import Ingest
+from covista_service.link.mailbox import Mailboxes
+from covista_service.link.publish import Publisher
+from covista_service.link.queries import Queries
+from covista_service.link.session import open_session
+from covista_service.loop import Loop
+from covista_service.station.options import GroupingOptions, StationOptions
+from covista_service.station.station import Station
+from covista_service.store.history import History
+from covista_service.telemetry import Telemetry
+from covista_service.workers import Workers, WorkersOptions
+
+# The loop turns four times a second; when it does not for so long, something blocks it.
+_SILENT_S = 2.0
+
+
+def create_app(settings: Settings) -> FastAPI:
+    """The station as an ASGI application; its lifespan opens and closes everything. Raises AccessError."""
+    check_listening(settings.api_address.host, settings.link, insecure=settings.insecure)
+
+    @asynccontextmanager
+    async def lifespan(_app: FastAPI) -> AsyncIterator[State]:
+        async with _open_parts(settings) as parts:
+            yield {"parts": parts}
+
+    app = FastAPI(
+        title="Covista",
+        version=version("covista"),
+        description="What robots see in common, and which of them belong together.",
+        lifespan=lifespan,
+        redoc_url=None,
+    )
+    nouns = APIRouter(prefix="/api/v1", responses=errors.describe(422, 500))
+    for router in (robots.router, pairs.router, similarity.router, groups.router):
+        nouns.include_router(router)
+    app.include_router(nouns)
+    app.include_router(health.router)
+    errors.install(app)
+    # FastAPI's way to replace its own description is to assign the method.
+    setattr(app, "openapi", contract.describe(app))  # noqa: B010 - mypy refuses the plain assignment
+    return app
+
+
+@asynccontextmanager
+async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
+    async with AsyncExitStack() as stack:
+
+        def close_later(close: Callable[[], object]) -> None:
+            # Closing waits for threads; the loop must go on, for they may be asking it something.
+            stack.push_async_callback(asyncio.to_thread, close)
+
+        session = await asyncio.to_thread(open_session, settings.link, settings.connect)
+        close_later(session.close)
+        mailboxes = Mailboxes()
+        close_later(Ingest(session, settings.site, mailboxes).close)
+        publisher = Publisher(session, settings.site)
+        close_later(publisher.close)
+        history = await asyncio.to_thread(History, settings.database)
+        close_later(history.close)
+        workers = Workers(WorkersOptions(settings.workers, settings.workers_count))
+        close_later(workers.close)
+        telemetry = Telemetry()
+        loop = Loop(
+            Station(_station_options(settings, workers.capacity, history.last.revision)),
+            Inbox(mailboxes),
+            workers,
+            (publisher, history),
+            telemetry,
+            next_event=history.last.event + 1,
+        )
+        task = asyncio.create_task(loop.run(), name="covista-loop")
+        stack.push_async_callback(_end, task)
+        close_later(Queries(session, settings.site, loop.ask).close)
+        link = PartHealth(status="ready", detail=", ".join((*settings.link, *settings.connect)))
+
+        def health_now() -> Health:
+            return _health({"link": link, "store": history.health(), "loop": _loop_health(loop, task)})
+
+        yield Parts(loop, telemetry, health_now, lambda: mailboxes.turned_away, secrets.token_hex(4))
+
+
+async def _end(task: asyncio.Task[None]) -> None:
+    task.cancel()
+    with suppress(asyncio.CancelledError):
+        await task
+
+
+def _loop_health(loop: Loop, task: asyncio.Task[None]) -> PartHealth:
+    if task.done():
+        return PartHealth(status="stopping", detail="the loop has ended")
+    silent_s = loop.silent_s()
+    if silent_s > _SILENT_S:
+        return PartHealth(status="degraded", detail=f"no turn for {silent_s:.1f} s")
+    return PartHealth(status="ready")
+
+
+def _health(parts: dict[str, PartHealth]) -> Health:
+    """As well as its worst part."""
+    for status in ("stopping", "starting", "degraded"):
+        if any(part.status == status for part in parts.values()):
+            return Health.model_validate({"status": status, "parts": parts})
+    return Health(status="ready", parts=parts)
+
+
+def _station_options(settings: Settings, capacity: int, revision: int) -> StationOptions:
+    return StationOptions(
+        capacity=capacity,
+        live_after_s=settings.live_after_s,
+        gone_after_s=settings.gone_after_s,
+        forget_after_s=settings.forget_after_s,
+        decay_after_s=settings.decay_after_s,
+        unknown_after_s=settings.unknown_after_s,
+        retry_after_s=settings.retry_after_s,
+        revision=revision,
+        grouping=_grouping_options(settings.live),
+    )
+
+
+def _grouping_options(live: LiveSettings) -> GroupingOptions:
+    groups = live.groups
+    bounds = (groups.min, groups.max) if isinstance(groups, GroupBounds) else groups
+    return GroupingOptions(live.alpha, bounds, live.sigma, live.criterion)

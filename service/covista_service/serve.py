@@ -1,0 +1,138 @@
+"""Runs the station in this process until it is told to stop: by a signal, or by `Running.stop`."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import signal
+import socket
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import uvicorn
+from covista_schemas.errors import CovistaError
+from fastapi import FastAPI
+from starlette.types import Receive, Scope, Send
+
+from covista_service.api.deps import Parts
+from covista_service.app import create_app
+from covista_service.config import Address, Settings
+from covista_service.telemetry import Summary
+
+# Answers under way get so long to be finished.
+_GRACE_S = 1
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class StartError(CovistaError):
+    """The station cannot start; the text is one line that says what to change."""
+
+
+@dataclass(frozen=True, slots=True)
+class Running:
+    """A station that listens: `url` of its API, end points of its zenoh link. `stop` may be called in any thread."""
+
+    url: str
+    link: tuple[str, ...]
+    summary: Callable[[], Summary]
+    stop: Callable[[], None]
+
+
+def run(settings: Settings, *, ready: Callable[[Running], None] | None = None) -> None:
+    """Run until stopped; `ready` is called once the station listens. Raises CovistaError where it cannot start."""
+    app = create_app(settings)
+    listener = _bind(settings.api_address)
+    try:
+        asyncio.run(_serve(app, settings, listener, ready))
+    finally:
+        listener.close()
+
+
+async def _serve(
+    app: FastAPI, settings: Settings, listener: socket.socket, ready: Callable[[Running], None] | None
+) -> None:
+    state: Mapping[str, Any] | None = None
+
+    async def stateful(scope: Scope, receive: Receive, send: Send) -> None:
+        scope["state"] = dict(state or {})
+        await app(scope, receive, send)
+
+    server = _Server(
+        uvicorn.Config(stateful, lifespan="off", log_config=None, access_log=False, timeout_graceful_shutdown=_GRACE_S)
+    )
+    # The lifespan is entered here and not by the server, so that what goes wrong comes out as an exception.
+    with _signals(server.stop):
+        async with app.router.lifespan_context(app) as state:
+            if state is None:
+                raise StartError("the application has no parts")
+            parts: Parts = state["parts"]
+            running = Running(_url(settings, listener), settings.link, parts.telemetry.summary, server.stop)
+            server.when_started = (lambda: ready(running)) if ready else _nothing
+            await server.serve([listener])
+
+
+class _Server(uvicorn.Server):
+    """Uvicorn's server, that leaves signals to us and says when it listens."""
+
+    when_started: Callable[[], None]
+
+    def stop(self) -> None:
+        """Stop soon; at once when told twice."""
+        self.force_exit = self.should_exit
+        self.should_exit = True
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        self.when_started()
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        yield
+
+
+@contextmanager
+def _signals(stop: Callable[[], None]) -> Iterator[None]:
+    """Have signals stop the server; not those that this process was told to ignore, and only in the main thread."""
+    loop = asyncio.get_running_loop()
+    heard = []
+    if threading.current_thread() is threading.main_thread():
+        heard = [number for number in _SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
+    for number in heard:
+        loop.add_signal_handler(number, stop)
+    try:
+        yield
+    finally:
+        for number in heard:
+            loop.remove_signal_handler(number)
+
+
+def _bind(address: Address) -> socket.socket:
+    """A socket that listens at the API's address. Raises StartError."""
+    change = "choose another with --api (COVISTA_API)"
+    try:
+        family, kind, protocol, _, place = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_STREAM)[0]
+    except socket.gaierror as error:
+        raise StartError(f"cannot listen on {address.host}: {error.strerror}; {change}") from error
+    listener = socket.socket(family, kind, protocol)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind(place)
+        # Two may bind to a port as long as neither listens.
+        listener.listen()
+    except OSError as error:
+        listener.close()
+        reason = "is taken" if error.errno == errno.EADDRINUSE else f"cannot be used: {error.strerror}"
+        raise StartError(f"API port {address.port} on {address.host} {reason}; {change}") from error
+    return listener
+
+
+def _url(settings: Settings, listener: socket.socket) -> str:
+    host = settings.api_address.host
+    return f"http://{f'[{host}]' if ':' in host else host}:{listener.getsockname()[1]}"
+
+
+def _nothing() -> None:
+    """Nobody waits to hear that the station listens."""
