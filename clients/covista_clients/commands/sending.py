@@ -57,7 +57,7 @@ def _read_camera(path: Path) -> Camera:
         return Camera.model_validate_json(path.read_bytes())
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-        where = ".".join(str(part) for part in first["loc"])
+        where = ".".join(str(part) for part in first["loc"]) or "camera"
         raise CovistaError(f"{path}: {where}: {first['msg']}") from error
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from covista_schemas import keys
 from covista_schemas.errors import CovistaError, MissingExtraError
 from covista_schemas.zenoh_config import check_endpoint
 
@@ -36,13 +37,13 @@ def swarm(
 ) -> None:
     """Drive simulated rovers through a rendered world, until Ctrl-C."""
     check_endpoint(connect)
+    keys.check_id(site, "site")
     with _simulation("covista swarm"):
         from covista_clients.simulation.swarm import SwarmOptions
 
         options = SwarmOptions(
             robots=robots, world=world, seed=seed, rate_hz=rate, connect=connect, site=site, send=send.value
         )
-    print(f"{robots} rovers in {world} send to {connect}; Ctrl-C ends.", file=sys.stderr)
     progress = _run(options, seconds)
     print(f"{progress.keyframes} keyframes and {progress.poses} poses, {progress.skipped} skipped", file=sys.stderr)
 
@@ -82,6 +83,8 @@ def _run(options: SwarmOptions, seconds: float | None) -> Progress:
     with ThreadPoolExecutor(1, "swarm") as pool:
         running = pool.submit(run_swarm, options, stop, seconds=seconds)
         with ends_by_interrupt():
+            where = f"{options.robots} rovers in {options.world} send to {options.connect}"
+            print(f"{where}; Ctrl-C ends.", file=sys.stderr)
             wait([running])
         stop.set()
         return running.result()

@@ -24,8 +24,8 @@ def watch(connect: Connect = DEFAULT_CONNECT, site: Site = "default", output: Ou
     """Print the groups, and again whenever they change, until Ctrl-C."""
     key = keys.groups(site)
     check_endpoint(connect)
-    print(f"Waiting for groups of site {site} by {connect}; Ctrl-C ends.", file=sys.stderr)
     with ends_by_interrupt():
+        print(f"Waiting for groups of site {site} by {connect}; Ctrl-C ends.", file=sys.stderr)
         session = open_with_retry(connect, threading.Event())
         if session is None:
             return

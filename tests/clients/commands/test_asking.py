@@ -1,0 +1,67 @@
+import pytest
+from covista_schemas.reports import GroupsReport
+
+from tests.clients import sample
+from tests.clients.commands.conftest import Run, _Station
+from tests.clients.ground import free_endpoint
+
+COMMANDS = {
+    "robots": (sample.ROBOTS, ["r1", "live", "g1", "1.00 2.00 3.00", "length [bold]2[/bold]"]),
+    "pairs": (sample.PAIRS, ["r1", "r2", "0.25", "-", "image", "77", "1.5"]),
+    "similarity": (sample.SIMILARITY, ["revision 4", "r2", "0.50"]),
+    "groups": (sample.GROUPS, ["g1", "r1 r2", "r3 (no_pose)", "revision 7", "fiedler", "1: 0.500"]),
+}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_table_for_people(run: Run, api: _Station, command: str) -> None:
+    code, out, err = run(command, "--url", api.url)
+    assert (code, err) == (0, "")
+    for word in COMMANDS[command][1]:
+        assert word in out
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_json_alone_for_programs(run: Run, api: _Station, command: str) -> None:
+    report = COMMANDS[command][0]
+    code, out, err = run(command, "--url", api.url, "--format", "json")
+    assert (code, err) == (0, "")
+    assert type(report).model_validate_json(out) == report
+
+
+def test_address_and_token_may_come_from_the_environment(
+    run: Run, api: _Station, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COVISTA_URL", api.url)
+    monkeypatch.setenv("COVISTA_TOKEN", "secret")
+    assert run("pairs", "--robot", "r1", "--min-overlap", "0.5")[0] == 0
+    assert api.asked == [("/api/v1/pairs?robot=r1&min_overlap=0.5", "Bearer secret")]
+
+
+def test_what_goes_wrong_is_one_line(run: Run) -> None:
+    url = free_endpoint().replace("tcp/", "http://")
+    code, out, err = run("groups", "--url", url)
+    assert (code, out) == (1, "")
+    assert err.startswith(f"covista: no answer from {url}")
+    assert len(err.splitlines()) == 1
+
+
+def test_a_wrong_option_is_told_with_how_to_do_it_right(run: Run) -> None:
+    code, _, err = run("groups", "--format", "xml")
+    assert code == 2
+    assert "table" in err
+
+
+def test_without_a_command_there_is_help(run: Run) -> None:
+    _, out, err = run()
+    for command in (*COMMANDS, "watch", "send", "swarm", "render"):
+        assert command in out + err
+
+
+def test_an_empty_station_has_tables_too(run: Run, api: _Station, monkeypatch: pytest.MonkeyPatch) -> None:
+    empty = sample.GROUPS.model_copy(update={"groups": [], "ungrouped": [], "scores": []})
+    assert isinstance(empty, GroupsReport)
+    monkeypatch.setitem(sample.ANSWERS, "/api/v1/groups", empty)
+    code, out, _ = run("groups", "--url", api.url)
+    assert code == 0
+    assert "revision 7" in out

@@ -1,0 +1,65 @@
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.clients.commands.conftest import Run
+from tests.clients.ground import DEADLINE_S, Ground
+
+
+def test_a_swarm_sends_and_leaves(run: Run, endpoint: str, ground: Ground) -> None:
+    arguments = ("--robots", "2", "--world", "wall", "--rate", "5", "--seconds", "0.5", "--connect", endpoint)
+    code, _, err = run("swarm", *arguments)
+    assert code == 0
+    assert {keyframe.robot for keyframe in ground.keyframes} == {"r1", "r2"}
+    assert "keyframes and" in err.splitlines()[-1]
+    ground.wait(lambda: not ground.tokens)
+
+
+def test_a_swarm_leaves_when_it_is_interrupted(endpoint: str, ground: Ground) -> None:
+    options = ["--robots", "1", "--world", "wall", "--connect", endpoint, "--send", "features"]
+    command = [sys.executable, "-m", "covista_clients", "swarm", *options]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        ground.wait(lambda: ground.keyframes)
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=DEADLINE_S)
+    assert process.returncode == 0
+    assert len(err.splitlines()) == 2
+    assert ground.keyframes[0].features is not None
+    ground.wait(lambda: not ground.tokens)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("swarm", "--world", "moon"), "there is no world 'moon'"),
+        (("swarm", "--rate", "0"), "rate_hz must be positive"),
+        (("swarm", "--connect", "nonsense"), "'nonsense' is not an end point"),
+        (("swarm", "--site", "no site", "--seconds", "0"), "site 'no site' does not match"),
+        (("render", "moon", "--out", "."), "moon"),
+    ],
+)
+def test_what_makes_no_sense_is_one_line(run: Run, arguments: tuple[str, ...], said: str) -> None:
+    code, out, err = run(*arguments)
+    assert (code, out) == (1, "")
+    assert said in err
+    assert len([line for line in err.splitlines() if line.startswith("covista: ")]) == 1
+
+
+def test_a_world_is_rendered_into_a_folder(run: Run, tmp_path: Path) -> None:
+    out = tmp_path / "wall"
+    assert run("render", "wall", "--cameras", "2", "--seed", "3", "--out", out)[0] == 0
+    assert len(json.loads((out / "dataset.json").read_text())["frames"]) == 2
+    assert (out / "overlap_gt.json").exists()
+
+
+def test_without_opencv_it_says_what_to_install(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in sys.modules if name.startswith("covista_clients.simulation")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    code, _, err = run("swarm")
+    assert code == 1
+    assert err == "covista: covista swarm needs an optional extra: pip install 'covista[vision]'\n"
