@@ -97,7 +97,7 @@ def test_a_run_is_reported_and_leaves_nothing_behind(tmp_path: Path) -> None:
     report = tmp_path / "report.json"
     scratch = tmp_path / "scratch"
     scratch.mkdir()
-    with started(scratch, "--seconds", "11.5", "--report", str(report)) as demo:
+    with started(scratch, "--seconds", "10.5", "--report", str(report)) as demo:
         for word in ("API", "docs", "zenoh", "g1"):
             demo.wait_for(word)
         family = demo.family()
@@ -117,25 +117,14 @@ def test_a_run_is_reported_and_leaves_nothing_behind(tmp_path: Path) -> None:
     assert found["group_changes"] >= 1
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_all_at_once(tmp_path: Path, number: signal.Signals) -> None:
+def test_ctrl_c_ends_all_at_once(tmp_path: Path) -> None:
     with started(tmp_path) as demo:
         demo.wait_for("g1")
         family = demo.family()
-        demo.process.send_signal(number)
+        demo.process.send_signal(signal.SIGINT)
         assert demo.process.wait(END_S) == 0
     assert all_ended(family)
     assert not list(tmp_path.iterdir())
-
-
-def test_nothing_outlives_a_demo_that_was_killed(tmp_path: Path) -> None:
-    with started(tmp_path) as demo:
-        demo.wait_for("zenoh")
-        family = demo.family()
-        demo.process.kill()
-        demo.process.wait()
-    assert family
-    assert all_ended(family)
 
 
 @pytest.mark.parametrize("flag", ["--api", "--link"])

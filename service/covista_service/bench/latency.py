@@ -18,8 +18,9 @@ from covista_service.bench import load
 from covista_service.bench.load import LoadOptions, Prepared, Sent
 from covista_service.bench.row import Row
 from covista_service.config import Settings
-from covista_service.demo import children, station_role
+from covista_service.demo import children
 from covista_service.demo.children import Child
+from covista_service.demo.run import STATION
 from covista_service.demo.tidings import Failed, Ready
 from covista_service.demo.watch import Watch
 from covista_service.telemetry import Summary
@@ -37,7 +38,7 @@ class LoadError(CovistaError):
 
 def rows(long: bool) -> Iterator[Row]:
     """`latency/p50` and `latency/p99`; they hold only if every keyframe is accounted for."""
-    summary, all_counted = under_load(LoadOptions(_free_endpoint(), _LONG_SECONDS if long else _SECONDS))
+    summary, all_counted = under_load(LoadOptions(free_endpoint(), _LONG_SECONDS if long else _SECONDS))
     for case, figure in (("p50", summary.latency_p50_ms), ("p99", summary.latency_p99_ms)):
         if figure is None:
             raise LoadError("no keyframe came as far as the groups")
@@ -60,10 +61,10 @@ def under_load(options: LoadOptions) -> tuple[Summary, bool]:
         folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="covista-", ignore_cleanup_errors=True))
         database = f"sqlite:///{folder}/covista.db"
         settings = Settings(api="127.0.0.1:0", link=(options.connect,), database=database, log_level="warning")
-        robots = children.start(load.play, options)
+        robots = children.start(load.__name__, options)
         stack.callback(robots.end)
         _expect(robots, Prepared)
-        station = children.start(station_role.play, settings)
+        station = children.start(STATION, settings)
         stack.callback(station.end)
         ready = _expect(station, Ready)
         watch = stack.enter_context(closing(Watch(ready.url)))
@@ -98,6 +99,7 @@ def _drained(watch: Watch, station: Child, sent: int) -> bool:
         time.sleep(_POLL_S)
 
 
-def _free_endpoint() -> str:
+def free_endpoint() -> str:
+    """An end point on this machine that nobody listens on."""
     with socket.create_server(("127.0.0.1", 0)) as probe:
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"

@@ -6,18 +6,17 @@ the parent alone.
 
 from __future__ import annotations
 
+import importlib
 import os
 import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from typing import Any
 
-Role = Callable[..., None]
 # How long a child may take to end in order once its parent is gone, or has told it to.
 GRACE_S = 3.0
 
@@ -69,8 +68,11 @@ class Child:
             self.process.wait()
 
 
-def start(role: Role, *arguments: object) -> Child:
-    """Start a process that runs `role(line, *arguments)`, an importable function with arguments that pickle."""
+def start(role: str, *arguments: object) -> Child:
+    """Start a process that runs `play(line, *arguments)` of the module `role`; the arguments must pickle.
+
+    The module goes by its name, so that the parent need not import what only the child uses.
+    """
     ours, theirs = Pipe()
     command = [sys.executable, "-m", __name__, str(theirs.fileno())]
     process = subprocess.Popen(  # noqa: S603 - our own interpreter and module
@@ -90,7 +92,7 @@ def main(descriptor: int) -> None:
     given = line.receive()
     if given is not None:
         role, arguments = given
-        role(line, *arguments)
+        importlib.import_module(role).play(line, *arguments)
 
 
 def end_soon() -> None:

@@ -14,7 +14,7 @@ from covista_schemas.errors import CovistaError
 from covista_schemas.reports import Group
 
 from covista_service.config import Settings
-from covista_service.demo import children, station_role, swarm_role
+from covista_service.demo import children
 from covista_service.demo.accuracy import Accuracy, rendered_overlap
 from covista_service.demo.children import Child
 from covista_service.demo.groups import GroupsFeed
@@ -24,6 +24,7 @@ from covista_service.demo.tidings import Failed, Ready
 from covista_service.demo.watch import Watch
 from covista_service.telemetry import Summary
 
+STATION, SWARM = "covista_service.demo.station_role", "covista_service.demo.swarm_role"
 # The first answers come while the swarm is still assembling; they say little of how good the station is.
 JUDGED_AFTER_S = 10.0
 POLL_S = 1.0
@@ -58,7 +59,7 @@ class DemoOptions:
 def run(options: DemoOptions, screen: Screen) -> DemoReport | None:
     """Run a demo in the main thread; the report, None if nobody wants one. Raises DemoError."""
     with listening() as signals, ExitStack() as stack:
-        station = children.start(station_role.play, options.settings)
+        station = children.start(STATION, options.settings)
         stack.callback(station.end)
         ready = _ready(station, signals)
         if ready is None:
@@ -67,7 +68,7 @@ def run(options: DemoOptions, screen: Screen) -> DemoReport | None:
         screen.line(f"docs     {ready.url}/docs")
         screen.line(f"zenoh    {', '.join(ready.link)}")
         watch = stack.enter_context(closing(Watch(ready.url)))
-        swarm = children.start(swarm_role.play, options.swarm)
+        swarm = children.start(SWARM, options.swarm)
         stack.callback(swarm.end)
         feed = stack.enter_context(GroupsFeed(ready.link[0], options.swarm.site))
         demo = Demo(station, swarm, watch, feed, _accuracy(options.swarm), signals, screen)

@@ -7,31 +7,15 @@ import sys
 import threading
 
 import psutil
-import pytest
 from covista_service.demo import children
-from covista_service.demo.children import Line
 
+ECHO, DEAF = "tests.service.demo.echo", "tests.service.demo.deaf"
 DEADLINE_S = 20.0
-
-
-def echo(line: Line, greeting: str) -> None:
-    """A role that says who it is, and then what it hears, until the line closes."""
-    line.send((greeting, os.getpid()))
-    while (message := line.receive()) is not None:
-        line.send(message)
-
-
-def deaf(line: Line) -> None:
-    """A role that hears of its parent's end, and then hangs."""
-    line.send(os.getpid())
-    line.receive()
-    children.end_soon()
-    threading.Event().wait()
 
 
 def start_and_hang() -> None:
     """A parent whose child is told of its end by the line alone."""
-    child = children.start(echo, "hello")
+    child = children.start(ECHO, "hello")
     _, pid = child.line.receive()
     sys.stdout.write(f"{pid}\n")
     sys.stdout.flush()
@@ -39,7 +23,7 @@ def start_and_hang() -> None:
 
 
 def test_a_child_plays_its_role_and_ends_with_its_line() -> None:
-    child = children.start(echo, "hello")
+    child = children.start(ECHO, "hello")
     assert child.line.receive() == ("hello", child.process.pid)
     for number in (signal.SIGINT, signal.SIGTERM):
         os.kill(child.process.pid, number)
@@ -49,8 +33,8 @@ def test_a_child_plays_its_role_and_ends_with_its_line() -> None:
     assert child.process.returncode == 0
 
 
-def test_a_child_that_hangs_ends_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    child = children.start(deaf)
+def test_a_child_that_hangs_ends_all_the_same() -> None:
+    child = children.start(DEAF)
     child.line.receive()
     child.end()
     assert child.process.returncode is not None
@@ -67,7 +51,7 @@ def test_a_child_ends_with_a_parent_that_was_killed() -> None:
 
 
 def test_nobody_at_the_other_end_is_no_error() -> None:
-    child = children.start(echo, "hello")
+    child = children.start(ECHO, "hello")
     child.line.receive()
     child.process.kill()
     child.process.wait()
