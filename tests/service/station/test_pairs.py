@@ -1,0 +1,201 @@
+"""What is answered about a pair: measured, predicted, decayed, unknown; and on which keyframes."""
+
+import numpy as np
+import pytest
+from covista_schemas.reports import FoundBy
+from covista_service.perception.survey import Outcome, Survey
+from covista_service.station.events import KeyframeId, SurveyDone, SurveyPair
+from covista_service.station.snapshot import PairView
+
+from tests.service.station.scenes import BACK, NOTHING, Scene, happenings, measured, pose, surveys
+
+
+def pair(scene: Scene, a: str = "r1", b: str = "r2") -> PairView:
+    return scene.snapshot.pair(a, b)
+
+
+def names(view: PairView) -> tuple[int, int] | None:
+    if view.keyframe_a is None or view.keyframe_b is None:
+        return None
+    return view.keyframe_a.id.sequence, view.keyframe_b.id.sequence
+
+
+def two_robots(find=lambda job: measured(), **options: object) -> Scene:
+    scene = Scene.of(**options)
+    scene.send("r1", pose(0))
+    scene.send("r2", pose(1))
+    scene.settle(find)
+    return scene
+
+
+def test_a_pair_that_was_not_surveyed_is_unknown() -> None:
+    scene = Scene()
+    scene.send("r1")
+    scene.send("r2")
+    view = pair(scene)
+    assert (view.found_by, view.overlap_a, view.overlap_b, view.age_s) == (FoundBy.UNKNOWN, None, None, None)
+    assert view.outcome == "not_surveyed"
+
+
+def test_a_survey_answers_for_the_smaller_id_first() -> None:
+    scene = two_robots(lambda job: measured(0.3, 0.7))
+    for view in (pair(scene, "r1", "r2"), pair(scene, "r2", "r1")):
+        assert (view.a, view.b) == ("r1", "r2")
+        assert (view.overlap_a, view.overlap_b, view.found_by) == (0.3, 0.7, FoundBy.IMAGE)
+        assert (view.outcome, view.inliers) == ("measured", 20)
+        assert view.survey is not None
+
+
+def test_an_unknown_robot_makes_no_pair() -> None:
+    with pytest.raises(KeyError):
+        pair(two_robots(), "r1", "r9")
+
+
+def test_a_new_keyframe_keeps_the_answer_until_it_is_surveyed() -> None:
+    scene = two_robots(lambda job: measured(0.3, 0.7))
+    scene.wait(1)
+    scene.send("r1", pose(0.5))
+    effects = scene.tick()
+    assert surveys(effects) == [("r1", "r2")]
+    assert (pair(scene).overlap_a, names(pair(scene)), pair(scene).age_s) == (0.3, (0, 0), 1.0)
+    scene.work(effects, lambda job: measured(0.4, 0.8))
+    assert (pair(scene).overlap_a, names(pair(scene)), pair(scene).age_s) == (0.4, (1, 0), 0.0)
+
+
+def test_a_survey_starts_from_the_last_result_if_that_was_a_measurement() -> None:
+    scene = two_robots()
+    scene.send("r1")
+    (job,) = [effect for effect in scene.tick() if isinstance(effect, SurveyPair)]
+    assert job.prior is pair(scene).survey
+    scene.work([job], lambda job: NOTHING)
+    scene.send("r1")
+    (job,) = [effect for effect in scene.tick() if isinstance(effect, SurveyPair)]
+    assert job.prior is None
+
+
+def test_a_survey_without_a_result_leaves_the_word_to_the_prediction() -> None:
+    scene = two_robots(lambda job: measured(0.3, 0.7, depth_m=4.0))
+    scene.send("r1", pose(0))
+    scene.settle(lambda job: NOTHING)
+    view = pair(scene)
+    assert (view.found_by, view.outcome, names(view)) == (FoundBy.PREDICTED, "few_matches", (1, 0))
+    # One metre aside at four metres: 75 px of 320.
+    assert view.overlap_a == pytest.approx(1 - 75 / 320)
+    assert view.overlap_b == pytest.approx(1 - 75 / 320)
+
+
+def test_without_a_depth_nothing_is_predicted() -> None:
+    view = pair(two_robots(lambda job: NOTHING))
+    assert (view.found_by, view.overlap_a, view.outcome) == (FoundBy.UNKNOWN, None, "few_matches")
+
+
+def test_depths_of_other_pairs_serve_a_pair_without_matches() -> None:
+    scene = Scene()
+    for number, x_m in enumerate((0.0, 1.0, 2.0)):
+        scene.send(f"r{number + 1}", pose(x_m))
+    scene.settle(lambda job: NOTHING if (job.first.robot, job.second.robot) == ("r1", "r3") else measured())
+    view = pair(scene, "r1", "r3")
+    assert view.found_by is FoundBy.PREDICTED
+    assert view.overlap_a == pytest.approx(1 - 150 / 320)
+
+
+def test_who_looks_away_is_predicted_to_see_nothing_in_common() -> None:
+    scene = two_robots()
+    scene.send("r3", pose(0, BACK))
+    scene.send("r4", pose(1, BACK))
+    scene.settle(lambda job: measured() if job.first.robot == "r3" and job.second.robot == "r4" else NOTHING)
+    view = pair(scene, "r1", "r4")
+    assert (view.overlap_a, view.overlap_b, view.found_by) == (0.0, 0.0, FoundBy.PREDICTED)
+
+
+def test_a_prediction_follows_the_newest_keyframes() -> None:
+    scene = two_robots()
+    scene.send("r1", pose(0))
+    scene.settle(lambda job: NOTHING)
+    before = pair(scene).overlap_a
+    scene.send("r1", pose(0.5))
+    scene.tick()
+    assert before is not None
+    assert pair(scene).overlap_a == pytest.approx(before + 37.5 / 320)
+
+
+def test_an_answer_decays_and_becomes_unknown() -> None:
+    scene = two_robots(forget_after_s=5000)
+    scene.wait(59.9)
+    assert pair(scene).found_by is FoundBy.IMAGE
+    scene.wait(0.1)
+    view = pair(scene)
+    assert (view.found_by, view.overlap_a, view.overlap_b) == (FoundBy.DECAYED, 0.5, 0.6)
+    assert view.age_s == pytest.approx(60)
+    scene.send_pose("r1", pose(0))
+    scene.send_pose("r2", pose(1))
+    scene.wait(539.9)
+    assert pair(scene).found_by is FoundBy.DECAYED
+    scene.wait(0.1)
+    view = pair(scene)
+    assert (view.found_by, view.overlap_a, view.age_s, names(view)) == (FoundBy.UNKNOWN, None, None, None)
+
+
+def test_an_unknown_pair_is_unknown_in_the_matrix_too() -> None:
+    scene = two_robots(forget_after_s=5000, gone_after_s=5000)
+    assert scene.snapshot.similarity.overlap.tolist() == [[1, 0.5], [0.6, 1]]
+    scene.wait(600)
+    assert np.isnan(scene.snapshot.similarity.overlap).tolist() == [[False, True], [True, False]]
+
+
+def test_ages_follow_the_moment_that_is_asked_for() -> None:
+    scene = two_robots()
+    later = scene.station.snapshot(scene.now_ns + 70_000_000_000)
+    assert later.pair("r1", "r2").found_by is FoundBy.DECAYED
+    assert scene.snapshot.pair("r1", "r2").found_by is FoundBy.IMAGE
+
+
+def test_a_gone_robot_is_answered_for_and_surveyed_until_it_is_forgotten() -> None:
+    scene = two_robots()
+    scene.wait(40)
+    scene.send("r1", pose(0.1))
+    assert surveys(scene.settle()) == [("r1", "r2")]
+    assert pair(scene).found_by is FoundBy.IMAGE
+
+
+def test_a_forgotten_robot_takes_its_pairs_along() -> None:
+    scene = two_robots()
+    scene.wait(300)
+    scene.send("r1", pose(0.1))
+    effects = scene.tick()
+    scene.wait(300)
+    assert list(scene.snapshot.records) == []
+    scene.work(effects)
+    assert list(scene.snapshot.records) == []
+
+
+def test_a_survey_that_failed_is_a_warning_and_no_answer() -> None:
+    scene = Scene()
+    scene.send("r1")
+    scene.send("r2")
+    scene.tick()
+    first, second = KeyframeId("r1", "b0", 0), KeyframeId("r2", "b0", 0)
+    effects = scene.receive(SurveyDone(first, second, None, "worker died"))
+    assert happenings(effects) == [("warning", "the survey of r1 and r2 failed: worker died")]
+    assert (pair(scene).found_by, pair(scene).outcome) == (FoundBy.UNKNOWN, "failed")
+    assert surveys(scene.settle()) == []
+
+
+def test_a_result_that_nobody_asked_for_changes_nothing() -> None:
+    scene = two_robots()
+    first, second = KeyframeId("r1", "b0", 0), KeyframeId("r2", "b0", 0)
+    scene.receive(SurveyDone(first, second, measured(0.1, 0.1)))
+    scene.receive(SurveyDone(KeyframeId("r7", "b0", 0), second, measured(0.1, 0.1)))
+    assert pair(scene).overlap_a == 0.5
+
+
+@pytest.mark.parametrize("outcome", [outcome for outcome in Outcome if outcome is not Outcome.MEASURED])
+def test_every_outcome_can_be_read(outcome: Outcome) -> None:
+    assert pair(two_robots(lambda job: Survey(outcome))).outcome == str(outcome)
+
+
+def test_every_pair_of_robots_stands_in_the_list_once() -> None:
+    scene = Scene()
+    for robot in ("r3", "r1", "r2"):
+        scene.send(robot)
+    assert [(view.a, view.b) for view in scene.snapshot.pairs()] == [("r1", "r2"), ("r1", "r3"), ("r2", "r3")]
