@@ -40,6 +40,7 @@ def _robot(view: RobotView) -> reports.RobotReport:
         camera=camera_message(view.camera) if view.camera else None,
         boot=view.boot,
         keyframe=keyframe_id(view.keyframe) if view.keyframe else None,
+        heard=keyframe_id(view.announced) if view.announced else None,
         last_seen=None if view.last_seen_ns is None else reports.time_of(view.last_seen_ns),
         clock_offset_s=view.clock_offset_s,
         pose_correction=None,

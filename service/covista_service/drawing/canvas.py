@@ -23,6 +23,7 @@ PALETTE: tuple[Colour, ...] = (
 YELLOW: Colour = (66, 228, 240)
 INK: Colour = (40, 40, 40)
 PAPER: Colour = (250, 250, 250)
+PENCIL: Colour = (110, 110, 110)
 GREY: Colour = (170, 170, 170)
 _SHIFT = 4
 _FONT = cv2.FONT_HERSHEY_SIMPLEX

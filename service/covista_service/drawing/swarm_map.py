@@ -55,9 +55,12 @@ def swarm_map(
         canvas.line(picture, ground.px(wall), canvas.GREY, 2, closed=True)
     for robot in placed:
         canvas.fill(picture, ground.px(views[robot.id]), colours.get(robot.id, canvas.GREY), 0.18)
-    _draw_edges(picture, pairs, {name: ground.px(view[0])[0] for name, view in views.items()})
-    for robot in placed:
-        _draw_robot(picture, robot.id, ground.px(views[robot.id]), colours.get(robot.id, canvas.GREY))
+    places_px = {name: ground.px(view[0])[0] for name, view in views.items()}
+    _draw_edges(picture, pairs, places_px)
+    for name, view in views.items():
+        canvas.line(picture, ground.px(view), colours.get(name, canvas.GREY), 2, closed=True)
+    for name, place_px in places_px.items():
+        _draw_robot(picture, name, place_px, colours.get(name, canvas.GREY))
     _draw_legend(picture, groups)
     _draw_scale(picture, ground)
     return canvas.png(picture)
@@ -93,14 +96,15 @@ def _draw_edges(picture: Picture, pairs: PairsReport, places_px: dict[str, Float
         overlap = max(pair.overlap_a or 0.0, pair.overlap_b or 0.0)
         if overlap >= _LEAST_OVERLAP and pair.a in places_px and pair.b in places_px:
             ends_px = np.vstack([places_px[pair.a], places_px[pair.b]])
-            canvas.line(picture, ends_px, canvas.INK, 1 + round(5 * overlap))
+            canvas.line(picture, ends_px, canvas.PENCIL, 1 + round(4 * overlap))
 
 
-def _draw_robot(picture: Picture, name: str, view_px: Floats, colour: Colour) -> None:
-    canvas.line(picture, view_px, colour, 2, closed=True)
-    canvas.dot(picture, view_px[0], 9.0, colour)
-    x, y = (int(value) for value in view_px[0])
-    canvas.text(picture, name, (x + 13, y - 9))
+def _draw_robot(picture: Picture, name: str, place_px: Floats, colour: Colour) -> None:
+    canvas.dot(picture, place_px, 9.0, colour)
+    x, y = (int(value) for value in place_px)
+    label_px = np.array([[0, -16], [canvas.text_width(name) + 6, -16], [canvas.text_width(name) + 6, 4], [0, 4]])
+    canvas.fill(picture, label_px + np.array([x + 12.0, y - 10.0]), canvas.PAPER, 0.75)
+    canvas.text(picture, name, (x + 15, y - 11))
 
 
 def _draw_legend(picture: Picture, groups: GroupsReport) -> None:

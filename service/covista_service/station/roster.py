@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 from covista_schemas.reports import Status
 
 from covista_service.perception.camera import Pose
-from covista_service.station.events import Keyframe, Topic
+from covista_service.station.events import Keyframe, KeyframeId, Topic
 from covista_service.station.ledger import Ledger
 from covista_service.station.options import StationOptions, nanoseconds
 from covista_service.station.prospects import Depth
@@ -32,7 +32,8 @@ class Fix:
 class Robot:
     """One robot, as far as the station has heard of it.
 
-    `arrived` is its newest keyframe, `keyframe` the newest one with features, which is in use.
+    `announced` names the newest keyframe that came, usable or not; `arrived` is the newest usable one, `keyframe` the
+    newest with features, which is in use.
     """
 
     id: str
@@ -45,6 +46,7 @@ class Robot:
     past_boots: deque[str] = field(default_factory=lambda: deque(maxlen=_PAST_BOOTS))
     fix: Fix | None = None
     pose_sequence: int = -1
+    announced: KeyframeId | None = None
     arrived: Keyframe | None = None
     keyframe: Keyframe | None = None
     depth: Depth | None = None
@@ -71,6 +73,13 @@ class Robot:
             return False
         self.fix = Fix(pose, time_ns, boot)
         return True
+
+    def announce(self, messages: Iterable[tuple[str, int]]) -> None:
+        """Note the names of keyframes, in order of arrival."""
+        for boot, sequence in messages:
+            newest = self.announced
+            if newest is None or newest.boot != boot or newest.sequence < sequence:
+                self.announced = KeyframeId(self.id, boot, sequence)
 
     def heard(self, arrived_ns: int, time_ns: int | None = None) -> None:
         """Note a message: presence by its arrival, the offset of the robot's clock by its sensor time."""

@@ -24,7 +24,10 @@ Reason = Literal["no_pose", "gone"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobotView:
-    """One robot; `camera` is that of its newest keyframe, `keyframe` the newest in use."""
+    """One robot; `camera` is that of its newest keyframe.
+
+    `keyframe` is the newest in use, `announced` the newest that came, usable or not.
+    """
 
     id: str
     status: Status
@@ -33,6 +36,7 @@ class RobotView:
     camera: Camera | None
     fix: Fix | None
     keyframe: KeyframeId | None
+    announced: KeyframeId | None
     last_seen_ns: int | None
     clock_offset_s: float | None
     keyframes: Counts

@@ -107,6 +107,8 @@ class Station:
         robot = self._touch(event.robot)
         robot.heard(event.arrived_ns)
         robot.ledgers[event.topic].hear(event.sequences, event.kept)
+        if event.topic == "keyframe":
+            robot.announce(event.sequences)
 
     def _message_dropped(self, event: MessageDropped) -> None:
         robot = self._touch(event.robot)
@@ -257,6 +259,7 @@ class Station:
             camera=None if robot.arrived is None else robot.arrived.camera,
             fix=robot.fix,
             keyframe=None if robot.keyframe is None else robot.keyframe.id,
+            announced=robot.announced,
             last_seen_ns=robot.last_seen_ns,
             clock_offset_s=None if offset_ns is None else offset_ns / NS_PER_S,
             keyframes=robot.ledgers["keyframe"].counts(),
