@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from covista_service.perception.camera import Floats
 
 _TINY = 1e-12
+_RIDGE = 1e-9
 Cells = NDArray[np.intp]
 
 
@@ -32,7 +33,7 @@ class FuzzyOptions:
     floor: float = 0.5
     initial_iterations: int = 8
     triples: int = 30
-    iterations: int = 6
+    iterations: int = 4
     settled: float = 0.02
 
 
@@ -47,6 +48,18 @@ class Points:
     def __len__(self) -> int:
         return len(self.rays)
 
+    @property
+    def place(self) -> Floats:
+        """Points (n, 3) as (x, y, rho)."""
+        return np.column_stack((self.rays[:, :2], self.inverse_depths))
+
+    @property
+    def moments(self) -> Floats:
+        """Products (n, 9): 1, x, y, rho, xx, xy, yy, x rho, y rho, each times the squared px per inverse depth."""
+        x, y, rho = self.place.T
+        products: Floats = np.column_stack((np.ones(len(self)), x, y, rho, x * x, x * y, y * y, x * rho, y * rho))
+        return products * (self.shifts_px**2)[:, None]
+
     def distances(self, planes: Floats) -> Floats:
         """Distances (n, K) in px from planes c (K, 3): Eq. 4 as transfer error in the second image."""
         away: Floats = np.abs(self.rays @ planes.T - self.inverse_depths[:, None]) * self.shifts_px[:, None]
@@ -56,10 +69,10 @@ class Points:
 def cluster(points: Points, options: FuzzyOptions, random: np.random.Generator) -> list[Floats]:
     """Planes c (K, 3) that the points lie on, after each merging: from many down to those that are left at the end."""
     planes = _robust_planes(points, initial_cells(points, options, random), options, random)
-    stages = [planes]
+    stages, moments = [planes], points.moments
     memberships: Floats | None = noise_memberships(points.distances(planes), options)
     while memberships is not None and memberships.shape[1]:
-        memberships, planes = _settle(points, memberships, options)
+        memberships, planes = _settle(points, moments, memberships, options)
         stages.append(planes)
         memberships = merge_most_similar(memberships)
     return stages
@@ -68,7 +81,7 @@ def cluster(points: Points, options: FuzzyOptions, random: np.random.Generator) 
 def initial_cells(points: Points, options: FuzzyOptions, random: np.random.Generator) -> Cells:
     """The cell (n,) that fuzzy c-means (1), (2) with m = 2 puts each point in, by pixel and inverse depth."""
     count = min(options.max_clusters, len(points) // options.points_per_cluster)
-    place = np.column_stack((points.rays[:, :2], points.inverse_depths))
+    place = points.place
     place = (place - place.mean(axis=0)) / (place.std(axis=0) + _TINY)
     centres = place[random.choice(len(place), count, replace=False)]
     for _ in range(options.initial_iterations):
@@ -83,27 +96,28 @@ def _robust_planes(points: Points, cells: Cells, options: FuzzyOptions, random: 
 
     Least squares would let one outlier among a cell's few points spoil its first plane for good.
     """
-    members = [np.flatnonzero(cells == cell) for cell in np.unique(cells)]
-    members = [own for own in members if len(own) >= 3]
     planes = []
-    for own in members:
-        triples = own[random.integers(len(own), size=(options.triples, 3))]
-        proposed = _through(points, triples)
+    for cell in np.unique(cells):
+        own = np.flatnonzero(cells == cell)
+        members = Points(points.rays[own], points.inverse_depths[own], points.shifts_px[own])
+        proposed = _through(members.place[random.integers(len(own), size=(options.triples, 3))])
         if len(proposed):
-            away = Points(points.rays[own], points.inverse_depths[own], points.shifts_px[own]).distances(proposed)
+            away = members.distances(proposed)
             planes.append(proposed[np.minimum(away, options.delta_px).sum(axis=0).argmin()])
     return np.array(planes).reshape(-1, 3)
 
 
-def _through(points: Points, triples: NDArray[np.intp]) -> Floats:
-    """Planes c (k, 3) through triples (m, 3) of points, k <= m of which are not in line."""
-    one, two, three = np.moveaxis(points.rays[triples], 1, 0)
-    rho = points.inverse_depths[triples]
-    turns = np.stack((np.cross(two, three), np.cross(three, one), np.cross(one, two)), axis=1)
-    determinant = (one * turns[:, 0]).sum(axis=1)
-    fixed = np.abs(determinant) > _TINY
-    planes: Floats = (rho[:, :, None] * turns).sum(axis=1)[fixed] / determinant[fixed, None]
-    return planes
+def _through(triples: Floats) -> Floats:
+    """Planes c (k, 3) through triples (m, 3, 3) of points (x, y, rho), k <= m of which are not in line."""
+    (dx, dy, dr), (ex, ey, er) = (triples[:, 1] - triples[:, 0]).T, (triples[:, 2] - triples[:, 0]).T
+    area = dx * ey - dy * ex
+    fixed = np.abs(area) > _TINY
+    area = np.where(fixed, area, 1.0)
+    slope_x, slope_y = (dr * ey - er * dy) / area, (dx * er - ex * dr) / area
+    x, y, rho = triples[:, 0].T
+    planes: Floats = np.column_stack((slope_x, slope_y, rho - slope_x * x - slope_y * y))
+    kept: Floats = planes[fixed]
+    return kept
 
 
 def noise_memberships(distances: Floats, options: FuzzyOptions) -> Floats:
@@ -113,23 +127,19 @@ def noise_memberships(distances: Floats, options: FuzzyOptions) -> Floats:
     return memberships
 
 
-def fit(points: Points, weights: Floats) -> Floats:
-    """Planes c (K, 3) through points with `weights` (n, K), least squares in px.
+def fit(moments: Floats, weights: Floats) -> Floats:
+    """Planes c (K, 3) through points with `moments` (n, 9) and `weights` (n, K), least squares in px.
 
     The centre (1) and the covariance (3) of (x, y, rho) give it: noise lies along rho alone, so the plane holds the
     centre and has the slope that the covariance tells.
     """
-    weights = weights * (points.shifts_px**2)[:, None]
-    weights = weights / (weights.sum(axis=0) + _TINY)
-    place = np.column_stack((points.rays[:, :2], points.inverse_depths))
-    centres = weights.T @ place  # (1)
-    products = (place[:, :, None] * place[:, None, :]).reshape(len(place), 9)
-    covariances = (weights.T @ products).reshape(-1, 3, 3) - centres[:, :, None] * centres[:, None, :]  # (3)
-    spread = covariances[:, :2, :2] + (_TINY + 1e-9 * np.trace(covariances[:, :2, :2], axis1=1, axis2=2))[
-        :, None, None
-    ] * np.eye(2)
-    slopes = np.linalg.solve(spread, covariances[:, :2, 2:])[:, :, 0]
-    return np.column_stack((slopes, centres[:, 2] - (slopes * centres[:, :2]).sum(axis=1)))
+    sums = (weights.T @ moments).T
+    total, x, y, rho, xx, xy, yy, xr, yr = sums / (sums[0] + _TINY)  # (1): x, y, rho
+    xx, xy, yy, xr, yr = xx - x * x, xy - x * y, yy - y * y, xr - x * rho, yr - y * rho  # (3)
+    xx, yy = xx + _RIDGE * (xx + yy) + _TINY, yy + _RIDGE * (xx + yy) + _TINY
+    area = xx * yy - xy * xy
+    slope_x, slope_y = (xr * yy - yr * xy) / area, (yr * xx - xr * xy) / area
+    return np.column_stack((slope_x, slope_y, total * (rho - slope_x * x - slope_y * y)))
 
 
 def merge_most_similar(memberships: Floats) -> Floats | None:
@@ -141,7 +151,8 @@ def merge_most_similar(memberships: Floats) -> Floats | None:
     if count < 2:
         return None
     sizes = memberships.sum(axis=0)
-    shared = np.minimum(memberships[:, :, None], memberships[:, None, :]).sum(axis=0)
+    rows = np.ascontiguousarray(memberships.T)
+    shared = np.minimum(rows[:, None, :], rows[None, :, :]).sum(axis=2)
     inclusion = shared / (np.minimum(sizes[:, None], sizes) + _TINY)
     np.fill_diagonal(inclusion, -1.0)
     one, other = np.unravel_index(int(inclusion.argmax()), inclusion.shape)
@@ -152,10 +163,10 @@ def merge_most_similar(memberships: Floats) -> Floats | None:
     return merged
 
 
-def _settle(points: Points, memberships: Floats, options: FuzzyOptions) -> tuple[Floats, Floats]:
+def _settle(points: Points, moments: Floats, memberships: Floats, options: FuzzyOptions) -> tuple[Floats, Floats]:
     """Turn by turn planes from memberships and memberships from planes, until little changes."""
     for _ in range(options.iterations):
-        planes = fit(points, memberships**2)
+        planes = fit(moments, memberships**2)
         updated = noise_memberships(points.distances(planes), options)
         change = np.abs(updated - memberships).max()
         memberships = updated

@@ -32,28 +32,28 @@ def match(first: Features, second: Features, options: MatchingOptions) -> Indice
 
 
 def mutual(distances: Distances, ratio: float) -> Indices:
-    """Pairs (k, 2) nearest to each other in `distances` (n, n'), at most `ratio` times the second best of both."""
+    """Pairs (k, 2) nearest to each other in `distances` (n, n'), below `ratio` times the second best of either.
+
+    Of equals none stands out, so no keypoint is taken twice.
+    """
     nearest = distances.argmin(axis=1)
-    rows = np.arange(len(distances))
-    rows = rows[distances.argmin(axis=0)[nearest] == rows]
-    columns = nearest[rows]
-    best = distances[rows, columns]
-    # A match whose only rival is itself has no second best.
-    second = np.minimum(_second_best(distances[rows]), _second_best(distances[:, columns].T))
-    kept = best <= ratio * second
+    best = distances[np.arange(len(distances)), nearest]
+    rows = np.flatnonzero(best <= distances.min(axis=0)[nearest])
+    columns, best = nearest[rows], best[rows]
+    in_row, in_column = distances[rows], distances[:, columns]
+    in_row[np.arange(len(rows)), columns] = np.inf
+    in_column[rows, np.arange(len(rows))] = np.inf
+    rival = np.minimum(in_row.min(axis=1, initial=np.inf), in_column.min(axis=0, initial=np.inf))
+    kept = best < ratio * rival
     return np.column_stack((rows[kept], columns[kept]))
-
-
-def _second_best(rows: Distances) -> Distances:
-    if rows.shape[1] < 2:
-        return np.full(len(rows), np.inf, np.float32)
-    return np.partition(rows, 1, axis=1)[:, 1]
 
 
 def _squared_distances(first: Descriptors, second: Descriptors) -> Distances:
     """|a - b|^2 by one matrix product. Bytes make every sum an integer below 2^24: float32 is exact."""
     a, b = first.astype(np.float32), second.astype(np.float32)
-    distances: Distances = np.einsum("ij,ij->i", a, a)[:, None] + np.einsum("ij,ij->i", b, b) - 2 * (a @ b.T)
+    distances: Distances = a @ (-2 * b).T
+    distances += np.einsum("ij,ij->i", a, a)[:, None]
+    distances += np.einsum("ij,ij->i", b, b)
     return distances
 
 

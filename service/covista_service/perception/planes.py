@@ -25,11 +25,11 @@ class PlaneOptions:
     fuzzy: FuzzyOptions = field(default_factory=FuzzyOptions)
     noise_px: float = 1.0
     outlier_range_px: float = 100.0
-    restarts: int = 3
+    restarts: int = 2
     min_support: int = 6
     price: float = 0.7
     thinnest: float = 0.03
-    refits: int = 3
+    refits: int = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,9 +118,10 @@ def _pruned(points: Points, planes: Floats, options: PlaneOptions) -> Floats:
 
 def _refitted(points: Points, planes: Floats, options: PlaneOptions) -> Floats:
     """Planes fitted to the points assigned to them; those with too few points, or with points on a line, are gone."""
+    moments = points.moments
     for _ in range(options.refits):
         weights = (assign(points, planes, options)[:, None] == np.arange(len(planes))).astype(np.float64)
-        planes = fit(points, weights)[_is_plane(points, weights, options)]
+        planes = fit(moments, weights)[_is_plane(points, weights, options)]
     return planes
 
 

@@ -54,10 +54,11 @@ def refine(
 
     Levenberg's iteration over a rotation vector and two tangents of the direction.
     """
-    inverses: Inverses = np.linalg.inv(second.matrix).T, np.linalg.inv(first.matrix)
+    inverses = np.linalg.inv(second.matrix).T, np.linalg.inv(first.matrix)
     products = (second_px[:, :, None] * first_px[:, None, :]).reshape(-1, 9)  # v_2 . F v_1 is linear in F
     best = Refined(rotation, direction, np.inf)
-    damping, step = _DAMPING, np.zeros(5)
+    damping = _DAMPING
+    step: Floats = np.zeros(5)
     for _ in range(_ITERATIONS):
         tried = _moved(best, step)
         errors, norm = residuals(_fundamental(tried, inverses), first_px, second_px)
@@ -116,6 +117,8 @@ def _deviation_slopes(pose: Refined, prior: PosePrior) -> Floats:
 
 def _tangents(direction: Floats) -> Floats:
     """Two unit vectors (3, 2) across a unit vector and each other."""
-    across = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
-    aside = across / np.linalg.norm(across)
-    return np.column_stack((aside, np.cross(direction, aside)))
+    across = cross_matrix(direction)
+    aside = across[:, np.abs(direction).argmin()]
+    aside = aside / np.linalg.norm(aside)
+    tangents: Floats = np.column_stack((aside, across @ aside))
+    return tangents

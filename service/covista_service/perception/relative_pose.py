@@ -9,9 +9,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from covista_service.perception.camera import Camera, Floats
+from covista_service.perception.camera import Floats
 from covista_service.perception.epipolar import fundamental, homogeneous, residuals, transfer_errors
 from covista_service.perception.pose_refinement import PosePrior, refine
+from covista_service.perception.sightings import Sightings
 from covista_service.perception.triangulation import TriangulationOptions, triangulate
 
 PoseSource = Literal["reported", "images"]
@@ -53,24 +54,6 @@ class RelativePose:
     verified: bool
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Sightings:
-    """Matches of two cameras: `first_px`, `second_px` (n, 2) in ideal pixels."""
-
-    first: Camera
-    second: Camera
-    first_px: Floats
-    second_px: Floats
-
-    def supporters(self, rotation: Floats, translation: Floats, inlier_px: float) -> Mask:
-        """Matches (n,) that agree with a pose; without a baseline only far points can."""
-        one, other = homogeneous(self.first_px), homogeneous(self.second_px)
-        if np.linalg.norm(translation) < _NO_BASELINE_M:
-            return transfer_errors(self.first, self.second, rotation, one, other) < inlier_px
-        F = fundamental(self.first, self.second, rotation, translation)
-        return np.abs(residuals(F, one, other)[0]) < inlier_px
-
-
 def relative_pose(
     sightings: Sightings, rotation: Floats, translation: Floats, options: RelativePoseOptions, seed: int
 ) -> RelativePose:
@@ -78,7 +61,7 @@ def relative_pose(
 
     The baseline's length is always the reported one. Where the images cannot say, the reported pose stands.
     """
-    reported = sightings.supporters(rotation, translation, options.inlier_px)
+    reported = _supporters(sightings, rotation, translation, options.inlier_px)
     needed = max(options.min_inliers, options.min_share * len(reported))
     stands = _facing(sightings, rotation, translation, reported)
     as_reported = RelativePose(rotation, translation, "reported", reported, bool(stands and reported.sum() >= needed))
@@ -88,10 +71,19 @@ def relative_pose(
     estimate = _estimated(sightings, rotation, translation, options, seed)
     if estimate is None:
         return as_reported
-    inliers = sightings.supporters(*estimate, options.inlier_px)
+    inliers = _supporters(sightings, *estimate, options.inlier_px)
     if inliers.sum() < needed or (stands and reported.sum() >= options.keep_share * inliers.sum()):
         return as_reported
     return RelativePose(*estimate, "images", inliers, True)
+
+
+def _supporters(sightings: Sightings, rotation: Floats, translation: Floats, inlier_px: float) -> Mask:
+    """Matches (n,) that agree with a pose; without a baseline only far points can."""
+    one, other = homogeneous(sightings.first_px), homogeneous(sightings.second_px)
+    if np.linalg.norm(translation) < _NO_BASELINE_M:
+        return transfer_errors(sightings.first, sightings.second, rotation, one, other) < inlier_px
+    F = fundamental(sightings.first, sightings.second, rotation, translation)
+    return np.abs(residuals(F, one, other)[0]) < inlier_px
 
 
 def _estimated(
@@ -110,7 +102,7 @@ def _estimated(
     best = min(refined, key=lambda estimate: estimate.cost)
     towards = best.direction * (length if length > _NO_BASELINE_M else _NOMINAL_BASELINE_M)
     # Epipolar lines are blind to the sign of t.
-    inliers = sightings.supporters(best.rotation, towards, options.inlier_px)
+    inliers = _supporters(sightings, best.rotation, towards, options.inlier_px)
     facing = _facing(sightings, best.rotation, towards, inliers)
     return best.rotation, towards if facing else -towards
 
@@ -151,7 +143,6 @@ def _facing(sightings: Sightings, rotation: Floats, translation: Floats, inliers
 
 def _in_front(sightings: Sightings, rotation: Floats, translation: Floats, chosen: Mask) -> int:
     """Number of chosen matches whose point lies in front of both cameras with parallax that is not mere noise."""
-    one, other = sightings.first_px[chosen], sightings.second_px[chosen]
     within = TriangulationOptions(reprojection_px=np.inf)
-    points = triangulate(sightings.first, sightings.second, rotation, translation, one, other, within)
+    points = triangulate(sightings.only(chosen), rotation, translation, within)
     return int((points.kept & (points.parallax_px > 1.0)).sum())

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from covista_service.perception.camera import Camera, Floats, View, relative, undistort
 from covista_service.perception.fuzzy import Points
 from covista_service.perception.matching import MatchingOptions, match
-from covista_service.perception.overlap import common_field, inverse_depths_second
+from covista_service.perception.overlap import CommonField, common_field, inverse_depths_second
 from covista_service.perception.planes import FoundPlanes, PlaneOptions, find_planes
 from covista_service.perception.polygon import corners
-from covista_service.perception.relative_pose import PoseSource, RelativePoseOptions, Sightings, relative_pose
-from covista_service.perception.territories import TerritoryOptions, territories
-from covista_service.perception.triangulation import TriangulationOptions, triangulate
+from covista_service.perception.relative_pose import PoseSource, RelativePose, RelativePoseOptions, relative_pose
+from covista_service.perception.sightings import Sightings
+from covista_service.perception.territories import Marks, TerritoryOptions, territories
+from covista_service.perception.triangulation import Triangulation, TriangulationOptions, triangulate
 
 
 class Outcome(StrEnum):
@@ -77,88 +78,107 @@ class SurveyOptions:
     territories: TerritoryOptions = field(default_factory=TerritoryOptions)
 
 
-def seen_orders(
-    first: Camera, second: Camera, found: Survey, planes: FoundPlanes, options: TerritoryOptions
-) -> tuple[Floats, Floats]:
-    """Which plane a pixel of either image shows."""
-    nearest_first = -planes.normals @ np.linalg.inv(first.matrix)
-    nearest_second, _ = inverse_depths_second(second, found.rotation, found.translation, planes.normals)
-    return (
-        territories(found.points_first_px, planes.labels, nearest_first, options),
-        territories(found.points_second_px, planes.labels, nearest_second, options),
-    )
-
-
 def survey(first: View, second: View, options: SurveyOptions, prior: Survey | None = None) -> Survey:
-    """Survey a pair of views; `prior` is the pair's last survey, to start from."""
+    """What do two keyframes see in common? `prior` is the pair's last survey, to start from.
+
+    A hopeless pair comes to an outcome with a name.
+    """
     if first.features.kind != second.features.kind:
         return Survey(Outcome.KINDS_DIFFER)
 
-    # Matched feature points ...
-    matches = match(first.features, second.features, options.matching)
-    if len(matches) < options.min_matches:
-        return Survey(Outcome.FEW_MATCHES, matches=len(matches))
+    # "n matched feature points ..."
+    sightings = _sightings(first, second, options.matching)
+    matches = len(sightings.first_px)
+    if matches < options.min_matches:
+        return Survey(Outcome.FEW_MATCHES, matches=matches)
+
+    # "... the orientation of both cameras is known, similarly the baseline": as reported, or better from the images.
+    pose = relative_pose(sightings, *relative(first.pose, second.pose), options.pose, options.seed)
+    found = _with_pose(pose, matches)
+    if not pose.verified:
+        return found
+
+    # "... with triangulated 3D coordinates": Eq. 8.
+    sightings = sightings.only(pose.inliers)
+    triangulated = triangulate(sightings, pose.rotation, pose.translation, options.triangulation)
+    if triangulated.kept.sum() < options.planes.min_support:
+        return replace(found, outcome=Outcome.NO_PARALLAX)
+    found = _with_points(found, sightings, triangulated)
+
+    # "Adaptive fuzzy plane clustering": Eqs. 1 to 6.
+    points = triangulated.only(triangulated.kept)
+    cloud = Points(points.rays, points.inverse_depths, points.shifts_px)
+    planes = find_planes(cloud, options.planes, options.seed, _known_planes(prior))
+    if not len(planes.normals):
+        return replace(found, outcome=Outcome.NO_PLANE)
+    found = replace(found, plane_of_point=planes.labels)
+
+    # "Projecting the visible region of one camera on the planes and then on the image plane of another camera."
+    orders = _orders(first.camera, second.camera, found, planes, options.territories)
+    common = common_field(first.camera, second.camera, pose.rotation, pose.translation, planes.normals, orders)
+    return _measured(found, planes, common)
+
+
+def _sightings(first: View, second: View, options: MatchingOptions) -> Sightings:
+    matches = match(first.features, second.features, options)
     first_px = undistort(first.camera, first.features.keypoints_px[matches[:, 0]])
     second_px = undistort(second.camera, second.features.keypoints_px[matches[:, 1]])
+    return Sightings(first.camera, second.camera, first_px, second_px)
 
-    # ... that agree with the relative pose, which is as reported unless the images know better ...
-    sightings = Sightings(first.camera, second.camera, first_px, second_px)
-    pose = relative_pose(sightings, *relative(first.pose, second.pose), options.pose, options.seed)
-    found = Survey(
+
+def _with_pose(pose: RelativePose, matches: int) -> Survey:
+    return Survey(
         Outcome.UNVERIFIED,
-        matches=len(matches),
+        matches=matches,
         inliers=int(pose.inliers.sum()),
         pose_source=pose.source,
         rotation=pose.rotation,
         translation=pose.translation,
     )
-    if not pose.verified:
-        return found
 
-    # ... are triangulated ...
-    seen = pose.inliers
-    points = triangulate(
-        first.camera,
-        second.camera,
-        pose.rotation,
-        pose.translation,
-        first_px[seen],
-        second_px[seen],
-        options.triangulation,
-    )
-    kept = points.kept
-    points = points.only(kept)
-    if len(points.rays) < options.planes.min_support:
-        return replace(found, outcome=Outcome.NO_PARALLAX)
-    found = replace(
+
+def _with_points(found: Survey, sightings: Sightings, points: Triangulation) -> Survey:
+    return replace(
         found,
-        points_first_px=first_px[seen][kept],
-        points_second_px=second_px[seen][kept],
-        depths_first=points.depths_first,
-        depths_second=points.depths_second,
-        plane_of_point=np.full(len(points.rays), -1),
+        points_first_px=sightings.first_px[points.kept],
+        points_second_px=sightings.second_px[points.kept],
+        depths_first=points.depths_first[points.kept],
+        depths_second=points.depths_second[points.kept],
+        plane_of_point=np.full(int(points.kept.sum()), -1),
     )
 
-    # ... and grouped into planes by adaptive fuzzy clustering;
-    known = None if prior is None else np.array([-plane.normal for plane in prior.planes]).reshape(-1, 3)
-    cloud = Points(points.rays, points.inverse_depths, points.shifts_px)
-    planes = find_planes(cloud, options.planes, options.seed, known)
-    if not len(planes.normals):
-        return replace(found, outcome=Outcome.NO_PLANE)
 
-    # the common field of view is what both cameras see of those planes.
-    orders = seen_orders(first.camera, second.camera, found, planes, options.territories)
-    field_of_view = common_field(first.camera, second.camera, pose.rotation, pose.translation, planes.normals, orders)
+def _known_planes(prior: Survey | None) -> Floats | None:
+    if prior is None or not prior.planes:
+        return None
+    return np.array([-plane.normal for plane in prior.planes])
+
+
+def _orders(
+    first: Camera, second: Camera, found: Survey, planes: FoundPlanes, options: TerritoryOptions
+) -> tuple[Floats, Floats]:
+    """Which plane a pixel of either image shows, as rows (K, 3)."""
+    on_plane = found.plane_of_point >= 0
+    owners = found.plane_of_point[on_plane]
+    nearest_first = -planes.normals @ np.linalg.inv(first.matrix)
+    nearest_second, _ = inverse_depths_second(second, found.rotation, found.translation, planes.normals)
+    return territories(
+        Marks(found.points_first_px[on_plane], owners, nearest_first),
+        Marks(found.points_second_px[on_plane], owners, nearest_second),
+        options,
+    )
+
+
+def _measured(found: Survey, planes: FoundPlanes, common: CommonField) -> Survey:
+    regions = zip(common.regions_first, common.regions_second, strict=True)
+    support = np.bincount(planes.labels[planes.labels >= 0], minlength=len(planes.normals)).tolist()
     return replace(
         found,
         outcome=Outcome.MEASURED,
-        overlap_first=field_of_view.overlap_first,
-        overlap_second=field_of_view.overlap_second,
+        overlap_first=common.overlap_first,
+        overlap_second=common.overlap_second,
         planes=tuple(
-            Plane(normal, int((planes.labels == k).sum()), corners(region_first), corners(region_second))
-            for k, (normal, region_first, region_second) in enumerate(
-                zip(planes.normals, field_of_view.regions_first, field_of_view.regions_second, strict=True)
-            )
+            Plane(normal, count, corners(in_first), corners(in_second))
+            for normal, count, (in_first, in_second) in zip(planes.normals, support, regions, strict=True)
         ),
-        plane_of_point=planes.labels,
     )

@@ -7,8 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from covista_service.perception.camera import Camera, Floats
+from covista_service.perception.camera import Floats
 from covista_service.perception.epipolar import fundamental, homogeneous, residuals
+from covista_service.perception.sightings import Sightings
+
+_IN_IMAGE = np.array([1.0, 1.0, 0.0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,20 +44,15 @@ class Triangulation:
 
 
 def triangulate(
-    first: Camera,
-    second: Camera,
-    rotation: Floats,
-    translation: Floats,
-    first_px: Floats,
-    second_px: Floats,
-    options: TriangulationOptions,
+    sightings: Sightings, rotation: Floats, translation: Floats, options: TriangulationOptions
 ) -> Triangulation:
-    """Solve Eq. 8 for matches (n, 2), after moving both ends onto each other's epipolar lines.
+    """Solve Eq. 8 for all matches, after moving both ends onto each other's epipolar lines.
 
     With camera 1 at the origin, P = (x, y, 1, rho) fulfils the first two rows of A P = 0 for every rho; the other two
     are a + b rho = 0.
     """
-    one, other, errors = _corrected(first, second, rotation, translation, homogeneous(first_px), homogeneous(second_px))
+    first, second = sightings.first, sightings.second
+    one, other, errors = _corrected(sightings, fundamental(first, second, rotation, translation))
     rays = one @ np.linalg.inv(first.matrix).T
     away = rays @ rotation.T @ second.matrix.T  # the point endlessly far away, in the second image
     nearer = second.matrix @ translation
@@ -71,19 +69,13 @@ def triangulate(
     return Triangulation(rays, rho, speed / ratio, parallax, 1.0 / rho, ratio / rho, kept)
 
 
-def _corrected(
-    first: Camera, second: Camera, rotation: Floats, translation: Floats, one: Floats, other: Floats
-) -> tuple[Floats, Floats, Floats]:
-    """Homogeneous matches moved by Sampson's correction, and by how many px (n,)."""
-    F = fundamental(first, second, rotation, translation)
-    errors = np.zeros(len(one))
-    moved_one, moved_other = one, other
+def _corrected(sightings: Sightings, F: Floats) -> tuple[Floats, Floats, Floats]:
+    """Matches as homogeneous points (n, 3), moved by Sampson's correction, and by how many px (n,)."""
+    start = homogeneous(sightings.first_px), homogeneous(sightings.second_px)
+    one, other = start
     for _ in range(2):
-        step, norm = residuals(F, moved_one, moved_other)
-        scale = (step / norm)[:, None]
-        step_one = scale * (moved_other @ F)[:, :2]
-        step_other = scale * (moved_one @ F.T)[:, :2]
-        moved_one = np.column_stack((moved_one[:, :2] - step_one, moved_one[:, 2]))
-        moved_other = np.column_stack((moved_other[:, :2] - step_other, moved_other[:, 2]))
-    errors = np.sqrt(((moved_one - one) ** 2 + (moved_other - other) ** 2).sum(axis=1))
-    return moved_one, moved_other, errors
+        error, norm = residuals(F, one, other)
+        step = (error / norm)[:, None] * _IN_IMAGE
+        one, other = one - step * (other @ F), other - step * (one @ F.T)
+    errors = np.sqrt(((one - start[0]) ** 2 + (other - start[1]) ** 2).sum(axis=1))
+    return one, other, errors
