@@ -28,7 +28,7 @@ class Groups:
         self._members: dict[str, Members] = {}
         self._label_of: dict[str, str] = {}
         self._next_label = 1
-        # News of pairs, robots or settings is evaluated at once, drift of positions a few times a second.
+        # News of robots or settings is evaluated at once, drift of positions and overlaps a few times a second.
         self._news = self._drift = False
         self._evaluated_ns = 0
         self.view = GroupsView(options.revision, 0, (), (), (), options.grouping)
@@ -65,16 +65,21 @@ class Groups:
         """Set a pair's overlaps, None where unknown; nothing happens while one of the two takes no part."""
         if pair[0] in self._affinity and pair[1] in self._affinity:
             self._affinity.see(*pair, *(overlaps or (None, None)))
-            self._news = True
+            self._drift = True
 
     def set_options(self, options: GroupingOptions) -> None:
         """Group by other settings from the next evaluation on."""
         self.view = replace(self.view, settings=options)
         self._news = True
 
-    def evaluate(self, ungrouped: Ungrouped, now_ns: int) -> list[Effect]:
-        """Bring similarity and groups up to date if there is news; a new revision only if someone stands elsewhere."""
-        drifted = self._drift and now_ns - self._evaluated_ns >= self._regroup_after_ns
+    def evaluate(self, ungrouped: Ungrouped, now_ns: int, *, at_once: bool) -> list[Effect]:
+        """Bring similarity and groups up to date if there is news; a new revision only if someone stands elsewhere.
+
+        `at_once` does not let drift wait.
+        """
+        # A clock that was set back must not make drift wait until it is where it was.
+        recent = 0 <= now_ns - self._evaluated_ns < self._regroup_after_ns
+        drifted = self._drift and (at_once or not recent)
         if self._news or drifted:
             scores, members = self._regroup()
             self._news = self._drift = False

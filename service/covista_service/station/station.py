@@ -221,12 +221,13 @@ class Station:
 
     def _regroup(self, now_ns: int) -> list[Effect]:
         before = self._groups.view, self._groups.similarity
-        effects = self._groups.evaluate(self._ungrouped(), now_ns)
+        seen = self._surveys.seen()
+        effects = self._groups.evaluate(self._ungrouped(), now_ns, at_once=bool(seen))
         if (self._groups.view, self._groups.similarity) != before:
             self._snapshot = None
         if effects:
             self._views.clear()
-        if seen := self._surveys.seen():
+        if seen:
             effects.append(GroupsEvaluated(seen))
         return effects
 

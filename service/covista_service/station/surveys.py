@@ -101,12 +101,12 @@ class Surveys:
         record = self._pairs[pair]
         if first.keyframe is None or second.keyframe is None:
             return
-        plausible = prospects.may_meet(first.keyframe, first.depth, second.keyframe, second.depth)
-        if not record.measured:
-            self._expect(pair, now_ns, plausible=plausible)
         # What was seen in common is worth another look, if only to find that it is no more.
         overlapped = record.measured and sum(self._pairs.overlaps(pair) or ()) > 0
-        self._agenda.judge(pair, plausible=plausible or overlapped)
+        plausible = overlapped or prospects.may_meet(first.keyframe, first.depth, second.keyframe, second.depth)
+        if not record.measured:
+            self._expect(pair, now_ns, plausible=plausible)
+        self._agenda.judge(pair, plausible=plausible)
 
     def _expect(self, pair: Pair, now_ns: int, *, plausible: bool = True) -> None:
         """Answer from poses and depths, where both depths are known."""

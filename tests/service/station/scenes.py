@@ -51,14 +51,14 @@ NOTHING = Survey(Outcome.FEW_MATCHES, matches=3)
 class Scene:
     """Drives a station: time stands still unless `wait` passes it, and nothing happens by itself."""
 
-    station: Station = field(default_factory=Station)
+    station: Station = field(default_factory=lambda: Station(StationOptions(regroup_after_s=0.0)))
     now_ns: int = START_NS
     told: list[Effect] = field(default_factory=list)
     sequences: dict[tuple[str, str, str], int] = field(default_factory=dict)
 
     @classmethod
     def of(cls, **options: object) -> "Scene":
-        return cls(Station(StationOptions(**options)))
+        return cls(Station(StationOptions(**{"regroup_after_s": 0.0, **options})))
 
     def receive(self, *events: Event) -> list[Effect]:
         effects = [effect for event in events for effect in self.station.receive(event, self.now_ns)]

@@ -21,8 +21,8 @@ def share(job):
     return measured(0.9, 0.9) if job.first.robot[0] == job.second.robot[0] else measured(0.0, 0.0)
 
 
-def two_groups() -> Scene:
-    scene = Scene()
+def two_groups(**options: object) -> Scene:
+    scene = Scene.of(**options)
     for number, robot in enumerate(("a1", "a2", "a3")):
         scene.send(robot, pose(0.1 * number))
     for number, robot in enumerate(("b1", "b2", "b3")):
@@ -77,19 +77,20 @@ def test_happenings_name_revisions_robots_and_labels() -> None:
     assert (whole.revision_before, whole.revision_after, whole.labels, whole.robots) == (0, 1, ("g1",), ("r1",))
 
 
-def test_poses_regroup_a_few_times_a_second_and_news_of_pairs_at_once() -> None:
-    scene = two_groups()
+def test_poses_regroup_a_few_times_a_second_and_a_new_keyframe_at_once() -> None:
+    scene = two_groups(regroup_after_s=0.1)
+    scene.wait(0.1)
     revision = scene.snapshot.similarity.revision
     for _ in range(20):
         scene.send_pose("a1", pose(0.1))
         scene.wait(0.01)
-    assert 1 <= scene.snapshot.similarity.revision - revision <= 3
-    scene.wait(0.1)
-    revision = scene.snapshot.similarity.revision
+    assert scene.snapshot.similarity.revision == revision + 2
     scene.send("a1", pose(0.1))
-    effects = scene.tick()
-    scene.work(effects, share)
-    assert scene.snapshot.similarity.revision > revision
+    scene.work(scene.tick(), share)
+    assert scene.snapshot.similarity.revision == revision + 3
+    scene.send_pose("a1", pose(0.1))
+    scene.wait(-3600)
+    assert scene.snapshot.similarity.revision == revision + 4
 
 
 def test_a_pose_alone_can_regroup() -> None:

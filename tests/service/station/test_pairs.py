@@ -199,3 +199,17 @@ def test_every_pair_of_robots_stands_in_the_list_once() -> None:
     for robot in ("r3", "r1", "r2"):
         scene.send(robot)
     assert [(view.a, view.b) for view in scene.snapshot.pairs()] == [("r1", "r2"), ("r1", "r3"), ("r2", "r3")]
+
+
+def test_a_renewed_answer_does_not_hold_up_the_decay_of_others() -> None:
+    scene = two_robots(forget_after_s=5000, gone_after_s=5000)
+    scene.send("r3", pose(2))
+    scene.settle()
+    for _ in range(6):
+        scene.wait(100)
+        scene.send("r1", pose(0))
+        scene.settle()
+    assert scene.snapshot.pair("r1", "r2").found_by is FoundBy.IMAGE
+    assert scene.snapshot.pair("r2", "r3").found_by is FoundBy.UNKNOWN
+    overlap = scene.snapshot.similarity.overlap
+    assert np.isnan(overlap[1:, 1:]).tolist() == [[False, True], [True, False]]
