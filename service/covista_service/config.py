@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple, Self
 
-from covista_schemas.errors import CovistaError
+from covista_schemas.errors import CovistaError, LinkError
 from covista_schemas.keys import ID_PATTERN
 from covista_schemas.reports import LiveSettings
+from covista_schemas.zenoh_config import check_endpoint
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, InitSettingsSource, NoDecode, PydanticBaseSettingsSource, SettingsConfigDict
 from sqlalchemy.engine import make_url
@@ -18,7 +19,6 @@ from sqlalchemy.exc import ArgumentError
 PREFIX = "COVISTA_"
 # Settings that are flags of `serve` too.
 FLAGS = ("api", "link", "connect", "database", "workers", "insecure")
-_PROTOCOLS = ("tcp", "tls", "quic", "ws", "udp", "unixsock-stream")
 
 
 class SettingsError(CovistaError):
@@ -46,12 +46,10 @@ def _check_address(text: str) -> str:
 
 
 def _check_endpoint(text: str) -> str:
-    protocol, slash, rest = text.partition("/")
-    if protocol not in _PROTOCOLS or not slash or not rest:
-        raise ValueError(f"{text!r} is not an end point such as tcp/127.0.0.1:7447; protocols: {', '.join(_PROTOCOLS)}")
-    if protocol != "unixsock-stream":
-        parse_address(rest.split("?")[0].split("#")[0])
-    return text
+    try:
+        return check_endpoint(text)
+    except LinkError as error:
+        raise ValueError(str(error)) from error
 
 
 def _check_database(text: str) -> str:

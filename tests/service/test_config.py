@@ -1,0 +1,116 @@
+import pickle
+from pathlib import Path
+
+import pytest
+from covista_schemas.reports import GroupBounds, LiveSettings
+from covista_service.config import Address, Settings, SettingsError, load, parse_address
+
+
+@pytest.fixture(autouse=True)
+def _clean_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in Settings.model_fields:
+        monkeypatch.delenv(f"COVISTA_{name.upper()}", raising=False)
+
+
+def test_defaults_are_those_of_the_contract() -> None:
+    settings = load()
+    assert (settings.api, settings.link, settings.site) == ("127.0.0.1:8000", ("tcp/127.0.0.1:7447",), "default")
+    assert settings.database == "sqlite:///covista.db"
+    assert settings.live == LiveSettings()
+    assert settings.api_address == Address("127.0.0.1", 8000)
+
+
+def test_flags_go_before_the_environment_before_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "station.toml"
+    file.write_text('alpha = 0.1\nsite = "file"\nsigma = 2.5\ngroups = { min = 2, max = 4 }\nlink = ["tcp/[::1]:1"]\n')
+    monkeypatch.setenv("COVISTA_ALPHA", "0.2")
+    monkeypatch.setenv("COVISTA_SITE", "environment")
+    settings = load({"alpha": 0.3}, file)
+    assert (settings.alpha, settings.site, settings.sigma) == (0.3, "environment", 2.5)
+    assert settings.groups == GroupBounds(min=2, max=4)
+    assert settings.link == ("tcp/[::1]:1",)
+
+
+def test_the_environment_says_lists_and_choices_as_text(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COVISTA_LINK", "tcp/127.0.0.1:1, tcp/127.0.0.1:2")
+    monkeypatch.setenv("COVISTA_GROUPS", "3")
+    monkeypatch.setenv("COVISTA_INSECURE", "true")
+    monkeypatch.setenv("COVISTA_CONNECT", "")
+    settings = load()
+    assert settings.link == ("tcp/127.0.0.1:1", "tcp/127.0.0.1:2")
+    assert (settings.groups, settings.insecure, settings.connect) == (3, True, ())
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("alpha", 2, "less than or equal to 1"),
+        ("alpha", "nan", "Input should be"),
+        ("groups", "many", "auto, a number of groups, or bounds"),
+        ("groups", 0, "greater than or equal to 1"),
+        ("sigma", -1, "greater than 0"),
+        ("criterion", "best", "'fiedler' or 'paper'"),
+        ("workers", "dask", "'threads' or 'processes'"),
+        ("workers_count", 0, "greater than or equal to 1"),
+        ("api", "8000", "not HOST:PORT"),
+        ("api", "127.0.0.1:70000", "port from 0 to 65535"),
+        ("link", "127.0.0.1:7447", "not an end point such as tcp/127.0.0.1:7447"),
+        ("link", "tcp/127.0.0.1", "not an end point"),
+        ("site", "Main Site", "pattern"),
+        ("database", "covista.db", "sqlite:///covista.db"),
+        ("log_level", "loud", "'debug'"),
+        ("live_after_s", 0, "greater than 0"),
+    ],
+)
+def test_a_setting_that_makes_no_sense_is_one_line_with_its_name(name: str, value: object, said: str) -> None:
+    with pytest.raises(SettingsError) as caught:
+        load({name: value})
+    line = str(caught.value)
+    assert line.startswith(f"setting {name} (")
+    assert f"COVISTA_{name.upper()}" in line
+    assert said in line
+    assert "\n" not in line
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"gone_after_s": 1000}, "setting forget_after_s = 600 must not be less than live_after_s"),
+        ({"decay_after_s": 900}, "setting decay_after_s = 900 must not be more than unknown_after_s"),
+        ({"link": ""}, "setting link is empty, and so is connect"),
+    ],
+)
+def test_settings_that_contradict_each_other_are_named(values: dict[str, object], said: str) -> None:
+    with pytest.raises(SettingsError, match=said):
+        load(values)
+
+
+def test_an_unknown_key_of_the_file_is_named_with_those_that_are_known(tmp_path: Path) -> None:
+    file = tmp_path / "station.toml"
+    file.write_text("alhpa = 0.5\n")
+    with pytest.raises(SettingsError, match=r"setting alhpa is not known; known are alpha, "):
+        load({}, file)
+
+
+@pytest.mark.parametrize("text", [b"alpha = .5\n", b"\xff\xfe"])
+def test_a_file_that_is_not_toml_is_named(tmp_path: Path, text: bytes) -> None:
+    file = tmp_path / "station.toml"
+    file.write_bytes(text)
+    with pytest.raises(SettingsError, match=r"--config .*station\.toml is not TOML"):
+        load({}, file)
+
+
+def test_an_absent_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match="cannot be read: No such file"):
+        load({}, tmp_path / "absent.toml")
+
+
+def test_settings_travel_between_processes() -> None:
+    settings = load({"groups": {"min": 1, "max": 2}})
+    assert pickle.loads(pickle.dumps(settings)) == settings
+
+
+def test_addresses_of_both_families() -> None:
+    assert parse_address("[::1]:80") == Address("::1", 80)
+    with pytest.raises(ValueError, match="not HOST:PORT"):
+        parse_address("localhost:http")
