@@ -76,7 +76,8 @@ def refine(
                 break
         else:
             damping = max(damping, _DAMPING) * 100
-        step = -np.linalg.solve(normal + damping * np.diag(normal.diagonal() + 1e-12), gradient)
+        damped = normal + damping * np.diag(normal.diagonal() + 1e-12)
+        step = np.asarray(-np.linalg.solve(damped, gradient), np.float64)
     return best
 
 

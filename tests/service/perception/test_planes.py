@@ -1,0 +1,106 @@
+import numpy as np
+import pytest
+from covista_service.perception.camera import Floats, relative
+from covista_service.perception.fuzzy import FuzzyOptions, Points, fit, merge_most_similar, noise_memberships
+from covista_service.perception.planes import FoundPlanes, PlaneOptions, description_length, find_planes
+from covista_service.perception.triangulation import TriangulationOptions, triangulate
+
+from tests.service.perception.scenes import ORIGIN, Scene, beside, corner, plane, scene, wall
+
+OPTIONS = PlaneOptions()
+FLOOR_AND_WALL = np.array([plane((0, 1, 0), 1.5), plane((0.1, 0, 1), 6)])
+
+
+def cloud(made: Scene) -> tuple[Points, np.ndarray]:
+    """Triangulated points of a scene, and the plane of each."""
+    found = triangulate(made.sightings(), *relative(ORIGIN, made.second.pose), TriangulationOptions(4.0))
+    kept = found.only(found.kept)
+    return Points(kept.rays, kept.inverse_depths, kept.shifts_px), made.owners[found.kept]
+
+
+def recovered(found: FoundPlanes, points: Points, owners: np.ndarray, planes: Floats) -> bool:
+    """Does each true plane have one found plane that most of its points lie near?"""
+    if not len(found.normals):
+        return False
+    away = points.distances(found.coefficients)
+    seen = [k for k in range(len(planes)) if (owners == k).sum() >= 12]
+    return all(np.median(away[owners == k], axis=0).min() < 1.5 for k in seen)
+
+
+@pytest.mark.parametrize(
+    ("planes", "outliers", "least"),
+    [(wall(), 0.2, 1.0), (wall(), 0.4, 1.0), (FLOOR_AND_WALL, 0.4, 0.9), (corner(), 0.2, 0.85), (corner(), 0.4, 0.7)],
+)
+def test_planes_are_found_among_outliers(planes: Floats, outliers: float, least: float) -> None:
+    successes = []
+    for seed in range(16):
+        points, owners = cloud(scene(planes, beside(seed), 220, 0.5, outliers, seed))
+        successes.append(recovered(find_planes(points, OPTIONS, 0), points, owners, planes))
+    assert np.mean(successes) >= least
+
+
+def test_the_length_of_the_baseline_scales_the_planes_and_nothing_else() -> None:
+    points, _ = cloud(scene(corner(), beside(), 220, 0.5, 0.2))
+    one = find_planes(points, OPTIONS, 0)
+    for w in (0.1, 10.0):
+        scaled = find_planes(Points(points.rays, points.inverse_depths / w, points.shifts_px * w), OPTIONS, 0)
+        np.testing.assert_array_equal(scaled.labels, one.labels)
+        np.testing.assert_allclose(scaled.coefficients * w, one.coefficients, rtol=1e-9, atol=1e-12)
+
+
+def test_known_planes_are_kept_where_they_still_fit() -> None:
+    points, owners = cloud(scene(corner(), beside(), 220, 0.5, 0.2))
+    found = find_planes(points, PlaneOptions(restarts=0), 0, -corner())
+    assert recovered(found, points, owners, corner())
+
+
+def test_points_all_over_the_place_are_no_plane_and_hurt_nobody() -> None:
+    random = np.random.default_rng(0)
+    rays = np.column_stack((random.uniform(-0.6, 0.6, (40, 2)), np.ones(40)))
+    found = find_planes(Points(rays, random.uniform(0.01, 2, 40), np.full(40, 300.0)), OPTIONS, 0)
+    assert (found.labels >= 0).mean() < 0.5
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 5])
+def test_few_points_are_no_plane(count: int) -> None:
+    points = Points(np.ones((count, 3)), np.ones(count), np.ones(count))
+    found = find_planes(points, OPTIONS, 0)
+    assert found.normals.shape == (0, 3)
+    assert (found.labels == -1).all()
+
+
+def test_points_in_line_or_all_at_one_place_are_no_plane() -> None:
+    along = np.linspace(-0.5, 0.5, 40)
+    line = np.column_stack((along, 0.3 * along, np.ones(40)))
+    for rays in (line, np.ones((40, 3))):
+        assert not len(find_planes(Points(rays, np.full(40, 0.2), np.full(40, 300.0)), OPTIONS, 0).normals)
+
+
+def test_a_fit_goes_through_exact_points() -> None:
+    random = np.random.default_rng(3)
+    rays = np.column_stack((random.uniform(-0.5, 0.5, (30, 2)), np.ones(30)))
+    truth = np.array([0.1, -0.05, 0.2])
+    points = Points(rays, rays @ truth, random.uniform(100, 300, 30))
+    np.testing.assert_allclose(fit(points.moments, random.random((30, 1)))[0], truth, atol=1e-7)
+
+
+def test_memberships_and_the_outliers_share_make_one() -> None:
+    options = FuzzyOptions(delta_px=2.0)
+    memberships = noise_memberships(np.array([[2.0, 1e6], [1e6, 1e6], [0.0, 1e6]]), options)
+    np.testing.assert_allclose(memberships.sum(axis=1), [0.5, 0.0, 0.8], atol=1e-6)
+
+
+def test_two_clusters_can_become_one_and_strangers_stay_apart() -> None:
+    alike = np.full((20, 2), 0.5)
+    merged = merge_most_similar(alike)
+    assert merged is not None
+    np.testing.assert_allclose(merged, 1.0)
+    assert merge_most_similar(np.repeat(np.eye(2), 10, axis=0)) is None
+    assert merge_most_similar(np.ones((5, 1))) is None
+
+
+def test_a_true_plane_shortens_the_description() -> None:
+    points, _ = cloud(scene(wall(), beside(), 200, 0.5, 0.2))
+    none, true = np.zeros((0, 3)), -wall()
+    assert description_length(points, true, OPTIONS) < description_length(points, none, OPTIONS)
+    assert description_length(points, true, OPTIONS) < description_length(points, np.vstack((true, true)), OPTIONS)
