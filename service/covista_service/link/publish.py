@@ -54,8 +54,13 @@ class Publisher:
             self._closing = True
             self._changed.notify()
         self._thread.join()
-        for publisher in self._publishers.values():
-            publisher.undeclare()
+        while self._publishers:
+            self._publishers.popitem()[1].undeclare()
+
+    @property
+    def keys(self) -> frozenset[str]:
+        """The keys that hold a last value."""
+        return frozenset(self._publishers)
 
     def _run(self) -> None:
         while True:

@@ -1,0 +1,244 @@
+import asyncio
+from collections.abc import Awaitable, Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
+
+import pytest
+from covista_schemas.codec import BAD_IMAGE
+from covista_schemas.errors import DecodeError
+from covista_schemas.reports import EventKind, FoundBy
+from covista_service.link.inbox import Inbox
+from covista_service.link.mailbox import Letter, Mailboxes
+from covista_service.loop import WORKER_FAILED, Loop, News
+from covista_service.perception.camera import Features
+from covista_service.perception.survey import Survey, SurveyOptions, survey
+from covista_service.station.events import Event, Keyframe, MessagesReceived, SurveyPair, TokenSeen
+from covista_service.station.station import Station
+from covista_service.telemetry import Telemetry
+
+from tests.service.deadline import DEADLINE_S
+from tests.service.station.scenes import FEATURES
+from tests.service.wall import keyframe_bytes, overlap, picture_bytes, pose_bytes
+
+
+class Hands:
+    """A crew that works in the caller's thread, and fails where told to."""
+
+    def __init__(self) -> None:
+        self.failure: Exception | None = None
+
+    def extract(self, keyframe: Keyframe) -> Future[Features]:
+        return self._done(lambda: FEATURES)
+
+    def survey(self, job: SurveyPair) -> Future[Survey]:
+        return self._done(lambda: survey(job.first_view, job.second_view, SurveyOptions(), job.prior))
+
+    def _done(self, work: Callable[[], object]) -> Future:
+        future: Future = Future()
+        if self.failure is not None:
+            future.set_exception(self.failure)
+        else:
+            future.set_result(work())
+        return future
+
+
+class Notebook:
+    """A sink that remembers."""
+
+    def __init__(self) -> None:
+        self.news: list[News] = []
+
+    def take(self, news: News) -> None:
+        self.news.append(news)
+
+
+class Desk:
+    """A loop with mailboxes before it and a notebook behind it; time is an argument."""
+
+    def __init__(self, **options: int) -> None:
+        self.now_ns = 1_700_000_000_000_000_000
+        self.mailboxes = Mailboxes()
+        self.hands = Hands()
+        self.notebook = Notebook()
+        self.telemetry = Telemetry()
+        self.station = Station()
+        self.loop = Loop(
+            self.station,
+            Inbox(self.mailboxes),
+            self.hands,
+            [self.notebook],
+            self.telemetry,
+            clock=lambda: self.now_ns,
+            **options,
+        )
+
+    def put(self, data: bytes, robot: str, sequence: int = 0) -> None:
+        self.mailboxes.put(Letter(robot, "keyframe", "b0", sequence, data, self.now_ns))
+
+    def settle(self) -> None:
+        for _ in range(10):
+            self.loop.turn()
+
+
+def test_keyframes_become_overlaps_groups_and_news() -> None:
+    desk = Desk(next_event=100)
+    desk.put(keyframe_bytes("r1", 0.0), "r1")
+    desk.put(keyframe_bytes("r2", 1.0), "r2")
+    desk.settle()
+    pair = desk.loop.snapshot().pair("r1", "r2")
+    assert pair.found_by is FoundBy.IMAGE
+    assert pair.overlap_a == pytest.approx(overlap(1.0), abs=0.05)
+    assert any(news.groups_changed and set(news.robots) == {"r1", "r2"} for news in desk.notebook.news)
+    numbers = [event.id for news in desk.notebook.news for event in news.events]
+    assert numbers == list(range(100, 100 + len(numbers)))
+    assert EventKind.GROUPS in [event.event for news in desk.notebook.news for event in news.events]
+    summary = desk.telemetry.summary()
+    assert (summary.surveys, summary.under_way, summary.keyframes_received) == (1, 0, 2)
+    assert summary.outcomes == {"measured": 1}
+
+
+def test_latency_runs_from_arrival_to_the_groups_with_a_survey_of_it() -> None:
+    desk = Desk()
+    desk.put(keyframe_bytes("r1", 0.0), "r1")
+    desk.put(keyframe_bytes("r2", 1.0), "r2")
+    desk.now_ns += 300_000_000
+    desk.settle()
+    assert desk.telemetry.summary().latency_p50_ms == pytest.approx(300)
+    assert desk.telemetry.summary().latency_p99_ms == pytest.approx(300)
+
+
+@pytest.mark.parametrize(
+    ("failure", "code"),
+    [(DecodeError(BAD_IMAGE, "image", "cannot be decoded"), BAD_IMAGE), (MemoryError("much"), WORKER_FAILED)],
+)
+def test_a_failed_extraction_drops_its_keyframe_alone(failure: Exception, code: str) -> None:
+    desk = Desk()
+    desk.hands.failure = failure
+    desk.put(picture_bytes("r1"), "r1")
+    desk.settle()
+    robot = desk.loop.snapshot().robots["r1"]
+    assert robot.keyframes.dropped == {code: 1}
+    assert robot.last_problem is not None
+    assert str(failure) in robot.last_problem
+    desk.hands.failure = None
+    desk.put(picture_bytes("r1", sequence=1), "r1", 1)
+    desk.settle()
+    assert desk.loop.snapshot().robots["r1"].keyframes.used == 1
+
+
+def test_a_failed_survey_is_counted_and_survived() -> None:
+    desk = Desk()
+    desk.hands.failure = ValueError("singular")
+    desk.put(keyframe_bytes("r1", 0.0), "r1")
+    desk.put(keyframe_bytes("r2", 1.0), "r2")
+    desk.settle()
+    assert desk.telemetry.summary().outcomes == {WORKER_FAILED: 1}
+    assert desk.loop.snapshot().pair("r1", "r2").survey is None
+
+
+def test_a_bug_that_one_event_brings_to_light_does_not_stop_the_others(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    desk = Desk()
+    receive = desk.station.receive
+
+    def buggy(event: Event, now_ns: int) -> list:
+        if isinstance(event, MessagesReceived) and event.robot == "r1":
+            raise ZeroDivisionError
+        return receive(event, now_ns)
+
+    monkeypatch.setattr(desk.station, "receive", buggy)
+    desk.mailboxes.put(Letter("r1", "pose", "b0", 0, pose_bytes("r1"), desk.now_ns))
+    desk.mailboxes.put(Letter("r2", "pose", "b0", 0, pose_bytes("r2"), desk.now_ns))
+    desk.settle()
+    assert desk.loop.snapshot().robots["r2"].poses.used == 1
+    assert "ZeroDivisionError" in caplog.text
+    assert b"covista_faults_total" in exposition(desk.telemetry)
+
+
+def exposition(telemetry: Telemetry) -> bytes:
+    from prometheus_client import generate_latest
+
+    return generate_latest(telemetry.registry)
+
+
+def test_a_crowd_is_taken_in_by_batches() -> None:
+    desk = Desk()
+    for number in range(100):
+        desk.mailboxes.token(f"r{number}", "b0", True, desk.now_ns)
+    assert desk.loop.turn()
+    assert len(desk.loop.snapshot().robots) < 100
+    while desk.loop.turn():
+        pass
+    assert len(desk.loop.snapshot().robots) == 100
+
+
+class Spring:
+    """A source that gives one event per wake-up."""
+
+    def __init__(self) -> None:
+        self.wake: Callable[[], None] = lambda: None
+        self.waiting: list[Event] = []
+
+    def attach(self, wake: Callable[[], None]) -> None:
+        self.wake = wake
+
+    def drain(self, limit: int) -> tuple[Iterable[Event], bool]:
+        taken, self.waiting = self.waiting, []
+        return taken, False
+
+
+async def until(look: Callable[[], bool]) -> None:
+    async with asyncio.timeout(DEADLINE_S):
+        while not look():
+            await asyncio.sleep(0.005)
+
+
+def running(scenario: Callable[[Loop, Spring], Awaitable[None]]) -> Loop:
+    """Run a scenario beside a running loop."""
+    spring = Spring()
+    loop = Loop(Station(), spring, Hands(), [], Telemetry())
+
+    async def together() -> None:
+        task = asyncio.create_task(loop.run())
+        await scenario(loop, spring)
+        task.cancel()
+        with suppress(asyncio.CancelledError):
+            await task
+
+    asyncio.run(together())
+    return loop
+
+
+@pytest.fixture
+def other_thread() -> Iterator[ThreadPoolExecutor]:
+    with ThreadPoolExecutor(1) as executor:
+        yield executor
+
+
+def test_other_threads_wake_and_ask(other_thread: ThreadPoolExecutor) -> None:
+    async def scenario(loop: Loop, spring: Spring) -> None:
+        await until(lambda: loop.silent_s() < 1)
+        spring.waiting.append(TokenSeen("r1", "b0"))
+        await asyncio.wrap_future(other_thread.submit(spring.wake))
+        await until(lambda: "r1" in loop.snapshot().robots)
+        snapshot = await asyncio.wrap_future(other_thread.submit(loop.ask))
+        assert "r1" in snapshot.robots
+
+    running(scenario)
+
+
+def test_after_the_end_nobody_waits() -> None:
+    async def scenario(loop: Loop, spring: Spring) -> None:
+        await until(lambda: loop.silent_s() < 1)
+
+    loop = running(scenario)
+    loop.wake()
+    with pytest.raises(TimeoutError):
+        loop.ask()
+
+
+def test_before_the_start_nobody_answers() -> None:
+    desk = Desk()
+    with pytest.raises(TimeoutError):
+        desk.loop.ask(timeout_s=0.01)
