@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -45,11 +47,20 @@ def send(
         session = zenoh.open(config("client", connect=[connect], timeout_ms=round(wait * 1000)))
     except zenoh.ZError as error:
         raise LinkError(f"no router at {connect} within {wait:g} s") from error
-    with session, _rover(robot, taken_by, site, session) as rover:
+    with session, _left_at_once(_rover(robot, taken_by, site, session)) as rover:
         dropped_before = _dropped(_ask(session, site, robot, deadline_s))
         keyframe = _hand_over(rover, picture, taken_from)
         _wait_until_in_use(session, rover, keyframe, dropped_before, deadline_s)
     print(f"{robot}: the station has the keyframe, {keyframe.sequence} of boot {keyframe.boot}")
+
+
+@contextmanager
+def _left_at_once(rover: Rover) -> Iterator[Rover]:
+    """By then the station has confirmed the keyframe, or has been waited for."""
+    try:
+        yield rover
+    finally:
+        rover.close(wait_s=0)
 
 
 def _read_camera(path: Path) -> Camera:

@@ -39,10 +39,9 @@ def pairs(report: PairsReport) -> RenderableType:
 def similarity(report: SimilarityReport) -> RenderableType:
     """The matrix, a row per robot."""
     table = _table("", *report.robots)
-    table.title = f"similarity, revision {report.revision}"
     for robot, row in zip(report.robots, report.similarity, strict=True):
         table.add_row(robot, *(_number(value) for value in row))
-    return table
+    return Group(table, f"revision {report.revision}")
 
 
 def groups(report: GroupsReport) -> RenderableType:

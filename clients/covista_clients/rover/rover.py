@@ -106,15 +106,15 @@ class Rover:
             if self._link is not None:
                 self._link.follow_group(callback)
 
-    def close(self) -> None:
-        """Send what still waits, wait for the station's confirmation (at most 2 s in all), and leave."""
+    def close(self, wait_s: float | None = None) -> None:
+        """Send what still waits, wait for the station's confirmation (`wait_s` in all, by default 2 s), and leave."""
         with self._link_lock:
             if self._closing:
                 return
             self._closing = True
-        deadline_s = time.monotonic() + CLOSE_TIMEOUT_S
+        deadline_s = time.monotonic() + (CLOSE_TIMEOUT_S if wait_s is None else wait_s)
         try:
-            if not (self._drain(deadline_s) and self._confirm(deadline_s)):
+            if wait_s != 0 and not (self._drain(deadline_s) and self._confirm(deadline_s)):
                 logger.warning("%s leaves without the station's confirmation of all it had to say", self.robot)
         finally:
             self._stop.set()
