@@ -33,6 +33,13 @@ class Camera:
         """Number of pixels, N_p of Eq. 16."""
         return self.width * self.height
 
+    @property
+    def rays_from_pixels(self) -> Floats:
+        """Inverse (3, 3) of the camera matrix: `rays_from_pixels @ (x, y, 1)` is the ray with Z = 1."""
+        (fx, skew, cx), (_, fy, cy), _ = self.matrix.tolist()
+        slant = -skew / (fx * fy)
+        return np.array([[1 / fx, slant, -cx / fx - slant * cy], [0.0, 1 / fy, -cy / fy], [0.0, 0.0, 1.0]])
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:

@@ -23,7 +23,7 @@ def cross_matrix(v: Floats) -> Floats:
 def fundamental(first: Camera, second: Camera, rotation: Floats, translation: Floats) -> Floats:
     """F (3, 3) with v_2 . F v_1 = 0 in pixels, for X_2 = R X_1 + t."""
     essential = cross_matrix(translation) @ rotation
-    matrix: Floats = np.linalg.inv(second.matrix).T @ essential @ np.linalg.inv(first.matrix)
+    matrix: Floats = second.rays_from_pixels.T @ essential @ first.rays_from_pixels
     return matrix
 
 
@@ -39,7 +39,7 @@ def residuals(F: Floats, first_px: Floats, second_px: Floats) -> tuple[Floats, F
 
 def transfer_errors(first: Camera, second: Camera, rotation: Floats, first_px: Floats, second_px: Floats) -> Floats:
     """Distances (n,) in px between homogeneous points (n, 3) of image 2 and where far points of image 1 would be."""
-    mapped = first_px @ (second.matrix @ rotation @ np.linalg.inv(first.matrix)).T
+    mapped = first_px @ (second.matrix @ rotation @ first.rays_from_pixels).T
     ahead = mapped[:, 2] > _TINY
     depth = np.where(ahead, mapped[:, 2], 1.0)
     gap = np.hypot(mapped[:, 0] / depth - second_px[:, 0], mapped[:, 1] / depth - second_px[:, 1])

@@ -43,7 +43,7 @@ class _Frustum:
         near, far = near_far_m
         right, bottom = camera.width - 0.5, camera.height - 0.5
         pixels = np.array([[-0.5, -0.5, 1], [right, -0.5, 1], [right, bottom, 1], [-0.5, bottom, 1]])
-        rays = pixels @ np.linalg.inv(camera.matrix).T @ pose.world_from_camera.T
+        rays = pixels @ camera.rays_from_pixels.T @ pose.world_from_camera.T
         endless = not np.isfinite(far)
         depths = [near] if endless else [near, far]
         self.corners = pose.centre_m + np.vstack([depth * rays for depth in depths])

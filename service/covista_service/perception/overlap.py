@@ -38,7 +38,7 @@ def common_field(
     the nearest, whose inverse depth is the largest. Every condition is linear in the pixel of the first image, so
     each plane's common region is one convex polygon there, and cutting before mapping never meets a horizon.
     """
-    pixels_to_rays = np.linalg.inv(first.matrix)
+    pixels_to_rays = first.rays_from_pixels
     homographies = homographies_of(first, second, rotation, translation, normals)
     rho_first = -normals @ pixels_to_rays
     rho_second, same_side = inverse_depths_second(second, rotation, translation, normals)
@@ -63,7 +63,7 @@ def common_field(
 def homographies_of(first: Camera, second: Camera, rotation: Floats, translation: Floats, normals: Floats) -> Floats:
     """H_k = K_2 (R - t u_k^T) K_1^-1 (K, 3, 3), not rescaled: (H_k v)_3 = Z_2 / Z_1."""
     homographies: Floats = (
-        second.matrix @ (rotation - translation[:, None] * normals[:, None, :]) @ np.linalg.inv(first.matrix)
+        second.matrix @ (rotation - translation[:, None] * normals[:, None, :]) @ first.rays_from_pixels
     )
     return homographies
 
@@ -79,7 +79,7 @@ def inverse_depths_second(
     side = 1.0 + normals @ centre
     edge_on = np.abs(side) < _EDGE_ON
     scale = np.where(edge_on, 0.0, 1.0 / np.where(edge_on, 1.0, side))
-    rho = -(normals @ rotation.T) * scale[:, None] @ np.linalg.inv(second.matrix)
+    rho = -(normals @ rotation.T) * scale[:, None] @ second.rays_from_pixels
     return rho, (side >= _EDGE_ON).tolist()
 
 

@@ -27,7 +27,6 @@ class PlaneOptions:
     outlier_range_px: float = 100.0
     restarts: int = 2
     min_support: int = 6
-    price: float = 0.7
     thinnest: float = 0.03
     refits: int = 2
 
@@ -46,12 +45,12 @@ class FoundPlanes:
 
 
 def find_planes(points: Points, options: PlaneOptions, seed: int, known: Floats | None = None) -> FoundPlanes:
-    """Planes of n points, strongest first; K may be 0. `known` planes c (K, 3) of an earlier survey join the starts."""
+    """Planes of n points, strongest first; K may be 0. `known` planes c (K, 3) of an earlier survey save restarts."""
     random = np.random.default_rng(seed)
     if len(points) < options.min_support:
         return FoundPlanes(np.zeros((0, 3)), np.full(len(points), _OUTLIER))
     proposed = [np.zeros((0, 3)) if known is None else known]
-    for _ in range(options.restarts):
+    for _ in range(options.restarts if known is None else min(options.restarts, 1)):
         proposed += cluster(points, options.fuzzy, random)
     chosen = _chosen(points, np.vstack(proposed), options)
     return _by_support(points, _pruned(points, chosen, options), options)
@@ -82,8 +81,9 @@ def description_length(points: Points, planes: Floats, options: PlaneOptions) ->
 
 
 def _price(points: Points, options: PlaneOptions) -> float:
-    """Nats to tell a plane: name three of its points, and tell each of them as an outlier."""
-    return float(options.price * 3 * (np.log(len(points)) + _outlier_cost(options)))
+    """Nats to tell a plane: which three of the points it goes through, and where each of them is."""
+    n = len(points)
+    return float(np.log(n * (n - 1) * (n - 2) / 6) + 3 * _outlier_cost(options))
 
 
 def _outlier_cost(options: PlaneOptions) -> float:

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from covista_service.perception.camera import Camera, Floats
 from covista_service.perception.epipolar import cross_matrix, residuals
@@ -15,7 +14,7 @@ _ITERATIONS = 12
 _CONVERGED = 1e-6
 _DAMPING = 1e-6
 
-Inverses = tuple[NDArray[np.floating], NDArray[np.floating]]
+Inverses = tuple[Floats, Floats]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +53,7 @@ def refine(
 
     Levenberg's iteration over a rotation vector and two tangents of the direction.
     """
-    inverses = np.linalg.inv(second.matrix).T, np.linalg.inv(first.matrix)
+    inverses = second.rays_from_pixels.T, first.rays_from_pixels
     products = (second_px[:, :, None] * first_px[:, None, :]).reshape(-1, 9)  # v_2 . F v_1 is linear in F
     best = Refined(rotation, direction, np.inf)
     damping = _DAMPING

@@ -160,7 +160,7 @@ def _orders(
     """Which plane a pixel of either image shows, as rows (K, 3)."""
     on_plane = found.plane_of_point >= 0
     owners = found.plane_of_point[on_plane]
-    nearest_first = -planes.normals @ np.linalg.inv(first.matrix)
+    nearest_first = -planes.normals @ first.rays_from_pixels
     nearest_second, _ = inverse_depths_second(second, found.rotation, found.translation, planes.normals)
     return territories(
         Marks(found.points_first_px[on_plane], owners, nearest_first),

@@ -53,7 +53,7 @@ def triangulate(
     """
     first, second = sightings.first, sightings.second
     one, other, errors = _corrected(sightings, fundamental(first, second, rotation, translation))
-    rays = one @ np.linalg.inv(first.matrix).T
+    rays = one @ first.rays_from_pixels.T
     away = rays @ rotation.T @ second.matrix.T  # the point endlessly far away, in the second image
     nearer = second.matrix @ translation
     a = other[:, :2] * away[:, 2:] - away[:, :2]
