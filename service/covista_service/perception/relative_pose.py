@@ -40,7 +40,7 @@ class RelativePoseOptions:
     rotation_deg: float = 3.0
     direction: float = 0.15
     ransac_px: float = 1.5
-    ransac_iterations: int = 500
+    ransac_iterations: int = 300
 
 
 @dataclass(frozen=True, slots=True, eq=False)
