@@ -24,7 +24,7 @@ class PlaneOptions:
 
     fuzzy: FuzzyOptions = field(default_factory=FuzzyOptions)
     noise_px: float = 1.0
-    outlier_range_px: float = 100.0
+    outlier_range_px: float = 60.0
     restarts: int = 2
     min_support: int = 6
     thinnest: float = 0.03

@@ -39,6 +39,16 @@ def test_planes_are_found_among_outliers(planes: Floats, outliers: float, least:
     assert np.mean(successes) >= least
 
 
+@pytest.mark.parametrize("planes", [wall(), FLOOR_AND_WALL, corner()], ids=["wall", "floor and wall", "corner"])
+def test_no_more_planes_are_found_than_there_are(planes: Floats) -> None:
+    right = []
+    for seed in range(16):
+        points, owners = cloud(scene(planes, beside(seed), 220, 0.5, 0.2, seed))
+        seen = sum((owners == k).sum() >= 12 for k in range(len(planes)))
+        right.append(len(find_planes(points, OPTIONS, 0).normals) <= seen)
+    assert np.mean(right) >= 0.8
+
+
 def test_the_length_of_the_baseline_scales_the_planes_and_nothing_else() -> None:
     points, _ = cloud(scene(corner(), beside(), 220, 0.5, 0.2))
     one = find_planes(points, OPTIONS, 0)
