@@ -12,6 +12,8 @@ from covista_service.station.events import Keyframe, KeyframeId, Pair
 
 NOT_SURVEYED = "not_surveyed"
 FAILED = "failed"
+# Images that were compared, and did not match, speak against what poses and depths predict.
+_UNMATCHED = (Outcome.FEW_MATCHES, Outcome.UNVERIFIED)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,6 +40,11 @@ class PairRecord:
     def measured(self) -> bool:
         """Does the answer rest on images?"""
         return self.answer is not None and self.answer.found_by is FoundBy.IMAGE
+
+    @property
+    def unmatched(self) -> bool:
+        """Were the images compared, and did not match?"""
+        return self.outcome in _UNMATCHED
 
 
 _NOTHING = PairRecord()

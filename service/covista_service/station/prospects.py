@@ -14,6 +14,9 @@ from covista_service.station.events import Keyframe, KeyframeId
 _LEAST_POINTS = 8
 # Matched points show the textured part of a scene only: nearer and farther surfaces may be there.
 _NEARER, _FARTHER = 0.3, 3.0
+# What is left of a prediction when the images were compared and did not match: something may stand between, or the
+# same place look another way. In rendered worlds anything from a quarter to a half halves the error of such pairs.
+UNMATCHED = 0.5
 
 
 @dataclass(frozen=True, slots=True)

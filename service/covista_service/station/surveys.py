@@ -114,7 +114,9 @@ class Surveys:
         if first.keyframe is not None and second.keyframe is not None and first.depth and second.depth:
             overlaps = (0.0, 0.0)
             if plausible:
-                overlaps = prospects.predict(first.keyframe, first.depth, second.keyframe, second.depth)
+                doubt = prospects.UNMATCHED if self._pairs[pair].unmatched else 1.0
+                q_first, q_second = prospects.predict(first.keyframe, first.depth, second.keyframe, second.depth)
+                overlaps = (doubt * q_first, doubt * q_second)
             self._pairs.predicted(first.keyframe, second.keyframe, overlaps, now_ns)
         self._groups.see(pair, self._pairs.overlaps(pair))
 

@@ -79,9 +79,17 @@ def test_a_survey_without_a_result_leaves_the_word_to_the_prediction() -> None:
     scene.settle(lambda job: NOTHING)
     view = pair(scene)
     assert (view.found_by, view.outcome, names(view)) == (FoundBy.PREDICTED, "few_matches", (1, 0))
-    # One metre aside at four metres: 75 px of 320.
-    assert view.overlap_a == pytest.approx(1 - 75 / 320)
-    assert view.overlap_b == pytest.approx(1 - 75 / 320)
+    # One metre aside at four metres: 75 px of 320; and images that do not match speak against it.
+    assert view.overlap_a == pytest.approx(0.5 * (1 - 75 / 320))
+    assert view.overlap_b == pytest.approx(0.5 * (1 - 75 / 320))
+
+
+@pytest.mark.parametrize("outcome", [Outcome.NO_PARALLAX, Outcome.NO_PLANE])
+def test_images_that_match_do_not_speak_against_the_prediction(outcome: Outcome) -> None:
+    scene = two_robots(lambda job: measured(0.3, 0.7, depth_m=4.0))
+    scene.send("r1", pose(0))
+    scene.settle(lambda job: Survey(outcome))
+    assert pair(scene).overlap_a == pytest.approx(1 - 75 / 320)
 
 
 def test_without_a_depth_nothing_is_predicted() -> None:
@@ -96,7 +104,7 @@ def test_depths_of_other_pairs_serve_a_pair_without_matches() -> None:
     scene.settle(lambda job: NOTHING if (job.first.robot, job.second.robot) == ("r1", "r3") else measured())
     view = pair(scene, "r1", "r3")
     assert view.found_by is FoundBy.PREDICTED
-    assert view.overlap_a == pytest.approx(1 - 150 / 320)
+    assert view.overlap_a == pytest.approx(0.5 * (1 - 150 / 320))
 
 
 def test_who_looks_away_is_predicted_to_see_nothing_in_common() -> None:
@@ -116,7 +124,7 @@ def test_a_prediction_follows_the_newest_keyframes() -> None:
     scene.send("r1", pose(0.5))
     scene.tick()
     assert before is not None
-    assert pair(scene).overlap_a == pytest.approx(before + 37.5 / 320)
+    assert pair(scene).overlap_a == pytest.approx(before + 0.5 * 37.5 / 320)
 
 
 def test_an_answer_decays_and_becomes_unknown() -> None:
