@@ -6,13 +6,12 @@ import asyncio
 import secrets
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
-from importlib.metadata import version
 
 from covista_schemas.reports import GroupBounds, Health, LiveSettings, PartHealth
-from fastapi import APIRouter, FastAPI
+from fastapi import FastAPI
 
 from covista_service.access import check_listening
-from covista_service.api import contract, errors, groups, health, pairs, robots, similarity
+from covista_service.api import rest
 from covista_service.api.deps import Parts, State
 from covista_service.config import Settings
 from covista_service.link.inbox import Inbox
@@ -41,22 +40,7 @@ def create_app(settings: Settings) -> FastAPI:
         async with _open_parts(settings) as parts:
             yield {"parts": parts}
 
-    app = FastAPI(
-        title="Covista",
-        version=version("covista"),
-        description="What robots see in common, and which of them belong together.",
-        lifespan=lifespan,
-        redoc_url=None,
-    )
-    nouns = APIRouter(prefix="/api/v1", responses=errors.describe(422, 500))
-    for router in (robots.router, pairs.router, similarity.router, groups.router):
-        nouns.include_router(router)
-    app.include_router(nouns)
-    app.include_router(health.router)
-    errors.install(app)
-    # FastAPI's way to replace its own description is to assign the method.
-    setattr(app, "openapi", contract.describe(app))  # noqa: B010 - mypy refuses the plain assignment
-    return app
+    return rest.build(lifespan)
 
 
 @asynccontextmanager

@@ -1,6 +1,6 @@
 import asyncio
 from collections.abc import Awaitable, Callable, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 
 import pytest
@@ -10,36 +10,13 @@ from covista_schemas.reports import EventKind, FoundBy
 from covista_service.link.inbox import Inbox
 from covista_service.link.mailbox import Letter, Mailboxes
 from covista_service.loop import WORKER_FAILED, Loop, News
-from covista_service.perception.camera import Features
-from covista_service.perception.survey import Survey, SurveyOptions, survey
-from covista_service.station.events import Event, Keyframe, MessagesReceived, SurveyPair, TokenSeen
+from covista_service.station.events import Event, MessagesReceived, TokenSeen
 from covista_service.station.station import Station
 from covista_service.telemetry import Telemetry
 
 from tests.service.deadline import DEADLINE_S
-from tests.service.station.scenes import FEATURES
+from tests.service.hands import Hands
 from tests.service.wall import keyframe_bytes, overlap, picture_bytes, pose_bytes
-
-
-class Hands:
-    """A crew that works in the caller's thread, and fails where told to."""
-
-    def __init__(self) -> None:
-        self.failure: Exception | None = None
-
-    def extract(self, keyframe: Keyframe) -> Future[Features]:
-        return self._done(lambda: FEATURES)
-
-    def survey(self, job: SurveyPair) -> Future[Survey]:
-        return self._done(lambda: survey(job.first_view, job.second_view, SurveyOptions(), job.prior))
-
-    def _done(self, work: Callable[[], object]) -> Future:
-        future: Future = Future()
-        if self.failure is not None:
-            future.set_exception(self.failure)
-        else:
-            future.set_result(work())
-        return future
 
 
 class Notebook:

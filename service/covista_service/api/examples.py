@@ -1,4 +1,7 @@
-"""One example of each answer, for the OpenAPI description; checked by being built from the models."""
+"""One example of each answer, for the OpenAPI description; checked by being built from the models.
+
+FastAPI leaves null fields out of examples, so they have none that is required.
+"""
 
 from __future__ import annotations
 
@@ -20,6 +23,7 @@ from covista_schemas.reports import (
     PairSummary,
     PartHealth,
     PlaneReport,
+    PoseCorrection,
     PoseReport,
     Report,
     RobotReport,
@@ -41,9 +45,10 @@ ROBOT = RobotReport(
     camera=Camera(fx=500, fy=500, cx=320, cy=240, width=640, height=480),
     boot="b7f3",
     keyframe=_KEYFRAME,
+    heard=_KEYFRAME,
     last_seen=_TIME,
     clock_offset_s=-0.02,
-    pose_correction=None,
+    pose_correction=PoseCorrection(deg=0.4, m=0.02),
     keyframes=Counters(received=42, used=40, replaced=1, dropped={"bad_image": 1}),
     poses=Counters(received=420, used=420),
     last_problem="image: truncated after 5120 bytes",

@@ -71,7 +71,7 @@ def text(picture: Picture, words: str, place_px: tuple[int, int], colour: Colour
 def mask_of(shape: tuple[int, int], polygons_px: Sequence[NDArray[np.floating]]) -> Picture:
     """Where any of the polygons is: 255, (H, W)."""
     mask = np.zeros(shape, np.uint8)
-    for polygon_px in polygons_px:
+    for polygon_px in (polygon for polygon in polygons_px if len(polygon) >= 3):
         cv2.fillPoly(mask, [_fixed(polygon_px)], 255, cv2.LINE_AA, _SHIFT)
     return mask
 

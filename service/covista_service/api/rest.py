@@ -1,0 +1,30 @@
+"""The REST interface as one application: all routers, errors and the description."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+
+from fastapi import APIRouter, FastAPI
+from starlette.types import Lifespan
+
+from covista_service.api import contract, errors, groups, health, pairs, robots, similarity
+
+
+def build(lifespan: Lifespan[FastAPI] | None = None) -> FastAPI:
+    """The application; its state, `deps.State`, is what `lifespan` yields."""
+    app = FastAPI(
+        title="Covista",
+        version=version("covista"),
+        description="What robots see in common, and which of them belong together.",
+        lifespan=lifespan,
+        redoc_url=None,
+    )
+    nouns = APIRouter(prefix="/api/v1", responses=errors.describe(422, 500))
+    for router in (robots.router, pairs.router, similarity.router, groups.router):
+        nouns.include_router(router)
+    app.include_router(nouns)
+    app.include_router(health.router)
+    errors.install(app)
+    # FastAPI's way to replace its own description is to assign the method.
+    setattr(app, "openapi", contract.describe(app))  # noqa: B010 - mypy refuses the plain assignment
+    return app

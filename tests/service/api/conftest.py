@@ -1,0 +1,69 @@
+import asyncio
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import httpx
+import pytest
+from covista_schemas.reports import Health, PartHealth
+from covista_service.api import rest
+from covista_service.api.deps import Parts
+from covista_service.loop import Loop
+from covista_service.station.events import Event
+from covista_service.telemetry import Telemetry
+
+from tests.service.hands import Hands
+from tests.service.station.scenes import Scene
+
+
+class Silence:
+    """A source that nothing comes from."""
+
+    def attach(self, wake: object) -> None:
+        pass
+
+    def drain(self, limit: int) -> tuple[Iterable[Event], bool]:
+        return (), False
+
+
+@dataclass
+class Desk:
+    """The REST interface of a scene's station, without a network."""
+
+    scene: Scene = field(default_factory=Scene)
+    health: Health = field(default_factory=lambda: Health(status="ready", parts={"link": PartHealth(status="ready")}))
+
+    def __post_init__(self) -> None:
+        self.app = rest.build()
+        loop = Loop(self.scene.station, Silence(), Hands(), [], Telemetry(), clock=lambda: self.scene.now_ns)
+        self.parts = Parts(loop, Telemetry(), lambda: self.health, lambda: {"wrong_key": 2}, "test")
+
+    async def _stateful(self, scope: dict[str, Any], receive: Any, send: Any) -> None:
+        scope["state"] = {"parts": self.parts}
+        await self.app(scope, receive, send)
+
+    def ask(self, path: str, method: str = "GET", **headers: str) -> httpx.Response:
+        """One request."""
+
+        async def asking() -> httpx.Response:
+            transport = httpx.ASGITransport(self._stateful, raise_app_exceptions=False)
+            async with httpx.AsyncClient(transport=transport, base_url="http://station") as client:
+                return await client.request(method, path, headers=headers)
+
+        return asyncio.run(asking())
+
+    def get(self, path: str, **headers: str) -> httpx.Response:
+        """One question to the API."""
+        return self.ask(f"/api/v1{path}", **headers)
+
+
+@pytest.fixture(scope="module")
+def desk() -> Desk:
+    """Two robots that see the same, and one that has sent no keyframe."""
+    desk = Desk()
+    desk.scene.send("r1")
+    desk.scene.send("r2")
+    desk.scene.settle()
+    desk.scene.send_pose("r4", desk.scene.keyframe("r4").pose)
+    desk.scene.settle()
+    return desk
