@@ -12,6 +12,9 @@ if TYPE_CHECKING:
 
     from covista_service.bench.row import Row
 
+# Of a table that goes to a file or a pipe.
+_WIDTH = 130
+
 
 def bench(
     names: Annotated[
@@ -40,13 +43,16 @@ def bench(
     if format == "json":
         typer.echo(json.dumps([row.as_json() for row in rows], allow_nan=False))
     else:
-        Console().print(_table(rows))
+        Console(width=None if Console().is_terminal else _WIDTH).print(_table(rows))
 
 
 def _table(rows: list[Row]) -> Table:
     from rich.table import Table
 
-    table = Table("bench/case", "median", "spread", "peer", "its median", "mark", "holds")
+    table = Table()
+    table.add_column("bench/case", no_wrap=True)
+    for title in ("median", "spread", "peer", "its median", "mark", "holds"):
+        table.add_column(title)
     for row in rows:
         table.add_row(
             f"{row.bench}/{row.case}",
