@@ -111,7 +111,7 @@ class Loop:
         self._results: deque[Event] = deque()
         self._awake = asyncio.Event()
         self._asyncio: asyncio.AbstractEventLoop | None = None
-        self._turned_ns = 0
+        self._turned_ns = clock()
 
     async def run(self) -> None:
         """Turn until cancelled: when there is something to do, and every quarter of a second."""
