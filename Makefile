@@ -36,7 +36,8 @@ bench: .venv/.dev ## The benchmarks, beside their peers
 up: ## Station and rovers as containers, in the background
 	@$(call need_engine)
 	@echo "up: building the images and starting station and rovers"
-	@BASE_IMAGE=$$(docker/base.sh) && export BASE_IMAGE && $(STACK) build --quiet && $(STACK) up --detach
+	@BASE_IMAGE=$$(docker/base.sh) && export BASE_IMAGE && $(STACK) build --quiet && $(STACK) up --detach || \
+		{ echo "Where a port is taken, say another: COVISTA_API_AT=127.0.0.1:8001 COVISTA_LINK_AT=127.0.0.1:7448 make up"; exit 1; }
 	@echo "The station answers at http://$$($(STACK) port station 8000)/api/v1/groups; rovers reach it at tcp/$$($(STACK) port station 7447)."
 	@echo "make down ends all; the history stays in the volume covista_history."
 
