@@ -75,8 +75,11 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
         close_later(Queries(session, settings.site, loop.ask).close)
         link = PartHealth(status="ready", detail=", ".join((*settings.link, *settings.connect)))
 
+        crew = PartHealth(status="ready", detail=f"{workers.capacity} {settings.workers}")
+
         def health_now() -> Health:
-            return _health({"link": link, "store": history.health(), "loop": _loop_health(loop, task)})
+            moving = {"store": history.health(), "loop": _loop_health(loop, task)}
+            return _health({"link": link, "workers": crew, **moving})
 
         yield Parts(loop, telemetry, health_now, lambda: mailboxes.turned_away, secrets.token_hex(4))
 

@@ -124,8 +124,13 @@ class Loop:
             except TimeoutError:
                 pass
             self._awake.clear()
-            if self.turn():
-                self._awake.set()
+            try:
+                if self.turn():
+                    self._awake.set()
+            except Exception:
+                # The swarm is better served by a station that lost one batch than by none.
+                self._telemetry.fault("loop")
+                log.exception("a turn failed; going on")
             await asyncio.sleep(0)
 
     def turn(self) -> bool:

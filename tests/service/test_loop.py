@@ -187,6 +187,23 @@ def running(scenario: Callable[[Loop, Spring], Awaitable[None]]) -> Loop:
     return loop
 
 
+def test_a_source_that_fails_once_is_asked_again(caplog: pytest.LogCaptureFixture) -> None:
+    async def scenario(loop: Loop, spring: Spring) -> None:
+        drain, spring.drain = spring.drain, broken
+        await asyncio.sleep(0)
+        spring.wake()
+        await until(lambda: "OSError" in caplog.text)
+        spring.drain = drain
+        spring.waiting.append(TokenSeen("r1", "b0"))
+        spring.wake()
+        await until(lambda: "r1" in loop.snapshot().robots)
+
+    def broken(limit: int) -> tuple[Iterable[Event], bool]:
+        raise OSError
+
+    running(scenario)
+
+
 @pytest.fixture
 def other_thread() -> Iterator[ThreadPoolExecutor]:
     with ThreadPoolExecutor(1) as executor:

@@ -74,8 +74,9 @@ class Publisher:
                 self._events.clear()
             try:
                 self._publish(snapshot, robots, events)
-            except zenoh.ZError as error:
-                log.warning("cannot publish: %s", error)
+            except Exception:
+                # What cannot be published today must not keep tomorrow's groups from going out.
+                log.exception("cannot publish")
 
     def _publish(self, snapshot: Snapshot | None, robots: tuple[str, ...], events: tuple[EventReport, ...]) -> None:
         if snapshot is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 
 import numpy as np
@@ -23,6 +24,10 @@ from covista_service.station.events import (
     TokenSeen,
     Topic,
 )
+
+FAULT = "station_fault"
+
+log = logging.getLogger(__name__)
 
 
 def events_of(mail: Mail) -> Iterator[Event]:
@@ -64,7 +69,15 @@ def _open(letter: Letter) -> Event:
     try:
         return _keyframe(letter) if letter.topic == "keyframe" else _pose(letter)
     except DecodeError as error:
-        return MessageDropped(letter.robot, letter.topic, error.code, str(error), letter.arrived_ns, counted=True)
+        return _drop(letter, error.code, str(error))
+    except Exception:
+        # A bug that one message brings to light costs that message, and stands in its robot's account.
+        log.exception("cannot open a %s of %s", letter.topic, letter.robot)
+        return _drop(letter, FAULT, "the station failed to read it")
+
+
+def _drop(letter: Letter, code: str, text: str) -> MessageDropped:
+    return MessageDropped(letter.robot, letter.topic, code, text, letter.arrived_ns, counted=True)
 
 
 def _keyframe(letter: Letter) -> KeyframeArrived:

@@ -3,7 +3,7 @@ import pytest
 from covista_schemas import codec, features
 from covista_schemas.messages import Camera, Distortion, Keyframe, Pose
 from covista_service.link.mailbox import Letter, Mailboxes
-from covista_service.link.translate import camera_of, events_of, pose_of
+from covista_service.link.translate import FAULT, camera_of, events_of, pose_of
 from covista_service.station.events import (
     Event,
     KeyframeArrived,
@@ -92,6 +92,19 @@ def test_a_broken_thumbnail_spoils_its_keyframe() -> None:
     _, dropped = opened(data)
     assert isinstance(dropped, MessageDropped)
     assert dropped.text.startswith("features.thumbnail: ")
+
+
+def test_a_bug_in_reading_costs_one_message_and_is_told(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def broken(data: bytes, *, robot: str | None = None) -> None:
+        raise IndexError
+
+    monkeypatch.setattr(codec, "decode_pose", broken)
+    _, dropped = opened(pose_bytes("r1"), "pose")
+    assert isinstance(dropped, MessageDropped)
+    assert (dropped.code, dropped.counted) == (FAULT, True)
+    assert "IndexError" in caplog.text
 
 
 def test_refusals_and_tokens_become_events() -> None:
