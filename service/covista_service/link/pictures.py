@@ -14,6 +14,9 @@ MAX_THUMBNAIL_PIXELS = 1_000_000
 _JPEG, _JPEG_END = b"\xff\xd8\xff", b"\xff\xd9"
 _PNG, _PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"
 _START_OF_SCAN = 0xDA
+_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+# Pictures have a few dozen; a million of them would hold up everybody else's messages for seconds.
+_MAX_SEGMENTS = 1000
 
 
 def check_image(data: bytes, width: int, height: int) -> None:
@@ -30,13 +33,10 @@ def check_thumbnail(data: bytes) -> None:
 
 def measure(data: bytes, field: str, most_pixels: int) -> tuple[int, int]:
     """Width and height of a whole JPEG, PNG or WebP picture of at most `most_pixels`. Raises DecodeError."""
-    whole = _is_whole(data)
-    if whole is None:
+    head = _read(data)
+    if head is None:
         raise DecodeError(BAD_IMAGE, field, f"{len(data)} bytes that are not a JPEG, PNG or WebP picture")
-    try:
-        width, height = imagesize.get(BytesIO(data), exif_rotation=False)
-    except ValueError as error:
-        raise DecodeError(BAD_IMAGE, field, f"unreadable head: {error}") from error
+    width, height, whole = head
     if width <= 0 or height <= 0:
         raise DecodeError(BAD_IMAGE, field, "a head without a size")
     if width * height > most_pixels:
@@ -48,24 +48,35 @@ def measure(data: bytes, field: str, most_pixels: int) -> tuple[int, int]:
     return width, height
 
 
-def _is_whole(data: bytes) -> bool | None:
-    """Whether the picture's end is there; None if it is of no known format. Decoders fill up what is missing."""
+def _read(data: bytes) -> tuple[int, int, bool] | None:
+    """Width and height, not positive where there are none, and whether the picture's end is there.
+
+    None for what is of no known format. Decoders fill up what is missing at the end.
+    """
     if data.startswith(_JPEG):
-        scan = _scan(data)
-        return scan is not None and data.find(_JPEG_END, scan) >= 0
+        return _read_jpeg(data)
     if data.startswith(_PNG):
-        return _PNG_END in data[-64:]
-    if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
-        return len(data) >= 8 + int.from_bytes(data[4:8], "little")
-    return None
+        whole = _PNG_END in data[-64:]
+    elif data[:4] == b"RIFF" and data[8:12] == b"WEBP":
+        whole = len(data) >= 8 + int.from_bytes(data[4:8], "little")
+    else:
+        return None
+    width, height = imagesize.get(BytesIO(data), exif_rotation=False)
+    return width, height, whole
 
 
-def _scan(data: bytes) -> int | None:
-    """Where a JPEG's coded pictures begin, past the segments (one of which may hold a thumbnail with an end)."""
+def _read_jpeg(data: bytes) -> tuple[int, int, bool]:
+    """The size in the first frame's head; the end counts past all segments, of which one may hold a thumbnail."""
+    width = height = 0
     at = 2
-    while at + 4 <= len(data) and data[at] == 0xFF:
-        if data[at + 1] == _START_OF_SCAN:
-            return at
-        filler = data[at + 1] == 0xFF
-        at += 1 if filler else 2 + int.from_bytes(data[at + 2 : at + 4])
-    return None
+    for _ in range(_MAX_SEGMENTS):
+        if at + 4 > len(data) or data[at] != 0xFF:
+            break
+        kind = data[at + 1]
+        if kind == _START_OF_SCAN:
+            return width, height, data.find(_JPEG_END, at) >= 0
+        if kind in _FRAMES and not width:
+            height, width = int.from_bytes(data[at + 5 : at + 7]), int.from_bytes(data[at + 7 : at + 9])
+        # One more 0xFF is a filler.
+        at += 1 if kind == 0xFF else 2 + int.from_bytes(data[at + 2 : at + 4])
+    return width, height, False

@@ -1,3 +1,5 @@
+import time
+
 import cv2
 import numpy as np
 import pytest
@@ -74,6 +76,20 @@ def test_a_camera_s_preview_inside_a_jpeg_does_not_pass_for_its_end() -> None:
     data = whole[:2] + segment + whole[2:]
     check_image(data, 320, 240)
     assert code_of(data[:-400]) == BAD_IMAGE
+
+
+@pytest.mark.parametrize("junk", [b"\xff", b"\xff\xe0\x00\x02", b"\xff\xd0", b"\xff\xe0\x00\x02\x00"])
+def test_a_head_that_does_not_end_is_refused_before_it_costs_time(junk: bytes) -> None:
+    whole = encoded(".jpg")
+    data = whole[:2] + junk * (3_000_000 // len(junk)) + whole[2:]
+    began_s = time.process_time()
+    assert code_of(data) == BAD_IMAGE
+    assert time.process_time() - began_s < 0.2
+
+
+def test_fillers_between_the_segments_of_a_jpeg_are_passed_over() -> None:
+    whole = encoded(".jpg")
+    check_image(whole[:2] + b"\xff\xff" + whole[2:], 320, 240)
 
 
 def test_an_orientation_tag_does_not_turn_the_picture() -> None:
