@@ -23,6 +23,7 @@ from covista_service.link.session import open_session
 from covista_service.loop import Loop
 from covista_service.station.options import GroupingOptions, StationOptions
 from covista_service.station.station import Station
+from covista_service.store.database import check_url
 from covista_service.store.history import History
 from covista_service.telemetry import Telemetry
 from covista_service.workers import Workers, WorkersOptions
@@ -32,8 +33,9 @@ _SILENT_S = 2.0
 
 
 def create_app(settings: Settings) -> FastAPI:
-    """The station as an ASGI application; its lifespan opens and closes everything. Raises AccessError."""
+    """The station as an ASGI application; its lifespan opens and closes all. Raises AccessError or DatabaseError."""
     check_listening(settings.api_address.host, settings.link, insecure=settings.insecure)
+    check_url(settings.database)
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[State]:

@@ -55,7 +55,7 @@ def _check_endpoint(text: str) -> str:
 def _check_database(text: str) -> str:
     try:
         make_url(text)
-    except ArgumentError as error:
+    except (ArgumentError, ValueError) as error:
         raise ValueError("not a database URL such as sqlite:///covista.db") from error
     return text
 

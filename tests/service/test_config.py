@@ -58,6 +58,7 @@ def test_the_environment_says_lists_and_choices_as_text(monkeypatch: pytest.Monk
         ("link", "tcp/127.0.0.1", "not an end point"),
         ("site", "Main Site", "pattern"),
         ("database", "covista.db", "sqlite:///covista.db"),
+        ("database", "postgresql://host:port/covista", "not a database URL"),
         ("log_level", "loud", "'debug'"),
         ("live_after_s", 0, "greater than 0"),
     ],

@@ -6,14 +6,22 @@ from typing import Any
 
 from covista_schemas.errors import CovistaError
 from sqlalchemy import Engine, create_engine, event
-from sqlalchemy.exc import NoSuchModuleError
+from sqlalchemy.exc import ArgumentError, NoSuchModuleError
 
 # How long a write waits for another process that has the file locked.
 _BUSY_MS = 1000
 
 
+_SETTING = "setting database (--database, COVISTA_DATABASE)"
+
+
 class DatabaseError(CovistaError):
-    """A database URL for which there is no driver."""
+    """A database URL that no engine can be made of."""
+
+
+def check_url(url: str) -> None:
+    """Refuse what can never work, before anything listens. Raises DatabaseError."""
+    open_engine(url).dispose()
 
 
 def open_engine(url: str) -> Engine:
@@ -22,9 +30,10 @@ def open_engine(url: str) -> Engine:
         engine = create_engine(url, pool_pre_ping=True)
     except (ImportError, NoSuchModuleError) as error:
         raise DatabaseError(
-            f"setting database (--database, COVISTA_DATABASE): no driver for it: {error}; "
-            "PostgreSQL needs pip install 'covista[scale]'"
+            f"{_SETTING}: no driver for it: {error}; PostgreSQL needs pip install 'covista[scale]'"
         ) from error
+    except (ArgumentError, TypeError, ValueError) as error:
+        raise DatabaseError(f"{_SETTING}: options that make no sense: {error}") from error
     if engine.dialect.name == "sqlite":
         event.listen(engine, "connect", _prepare_sqlite)
     return engine

@@ -8,7 +8,7 @@ from covista_service.answers import groups_report
 from covista_service.loop import News
 from covista_service.station.options import StationOptions
 from covista_service.station.station import Station
-from covista_service.store.database import DatabaseError
+from covista_service.store.database import DatabaseError, check_url
 from covista_service.store.history import History
 
 from tests.service.deadline import wait_until
@@ -130,6 +130,17 @@ def test_a_full_queue_loses_its_oldest_and_says_how_many(tmp_path: Path) -> None
     history.close()
     assert rows(tmp_path / "absent" / "covista.db", "select number from events") == [(8,), (9,), (10,)]
     assert history.health().detail == "3 entries written; 7 entries lost"
+
+
+@pytest.mark.parametrize("url", ["nonsense://somewhere/db", "sqlite:///covista.db?timeout=long"])
+def test_a_url_that_can_never_work_is_a_mistake_in_the_settings(url: str) -> None:
+    with pytest.raises(DatabaseError, match=r"setting database \(--database, COVISTA_DATABASE\)"):
+        check_url(url)
+
+
+def test_to_check_a_url_opens_no_database(file: Path) -> None:
+    check_url(f"sqlite:///{file}")
+    assert not file.exists()
 
 
 def test_a_database_without_a_driver_is_a_mistake_in_the_settings() -> None:
