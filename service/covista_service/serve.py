@@ -7,7 +7,7 @@ import errno
 import signal
 import socket
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -41,18 +41,26 @@ class Running:
     stop: Callable[[], None]
 
 
-def run(settings: Settings, *, ready: Callable[[Running], None] | None = None) -> None:
-    """Run until stopped; `ready` is called once the station listens. Raises CovistaError where it cannot start."""
+def run(settings: Settings, *, ready: Callable[[Running], None] | None = None, signals: bool = True) -> None:
+    """Run until stopped; `ready` is called once the station listens. Raises CovistaError where it cannot start.
+
+    In the main thread SIGINT and SIGTERM stop it too, unless `signals` is False.
+    """
     app = create_app(settings)
     listener = _bind(settings.api_address)
     try:
-        asyncio.run(_serve(app, settings, listener, ready))
+        asyncio.run(_serve(app, settings, listener, ready, signals=signals))
     finally:
         listener.close()
 
 
 async def _serve(
-    app: FastAPI, settings: Settings, listener: socket.socket, ready: Callable[[Running], None] | None
+    app: FastAPI,
+    settings: Settings,
+    listener: socket.socket,
+    ready: Callable[[Running], None] | None,
+    *,
+    signals: bool,
 ) -> None:
     state: Mapping[str, Any] | None = None
 
@@ -64,7 +72,7 @@ async def _serve(
         uvicorn.Config(stateful, lifespan="off", log_config=None, access_log=False, timeout_graceful_shutdown=_GRACE_S)
     )
     # The lifespan is entered here and not by the server, so that what goes wrong comes out as an exception.
-    with _signals(server.stop):
+    with _stopped_by(_SIGNALS if signals else (), server.stop):
         async with app.router.lifespan_context(app) as state:
             if state is None:
                 raise StartError("the application has no parts")
@@ -94,12 +102,10 @@ class _Server(uvicorn.Server):
 
 
 @contextmanager
-def _signals(stop: Callable[[], None]) -> Iterator[None]:
-    """Have signals stop the server; not those that this process was told to ignore, and only in the main thread."""
+def _stopped_by(signals: Sequence[signal.Signals], stop: Callable[[], None]) -> Iterator[None]:
+    """Have signals stop the server, also where a shell had them ignored; other threads hear none."""
     loop = asyncio.get_running_loop()
-    heard = []
-    if threading.current_thread() is threading.main_thread():
-        heard = [number for number in _SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
+    heard = signals if threading.current_thread() is threading.main_thread() else ()
     for number in heard:
         loop.add_signal_handler(number, stop)
     try:

@@ -41,8 +41,9 @@ def refused(folder: Path, *flags: str, **variables: str) -> tuple[int, str]:
 def serving(folder: Path, *flags: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """A station's process and its URL."""
     listening = ["--api", "127.0.0.1:0", "--link", free_endpoint()]
+    # Ctrl-C is ignored at first, as it is for what a script starts in the background.
     process = subprocess.Popen(
-        [*COMMAND, *listening, *flags],
+        ["/bin/sh", "-c", 'trap "" INT; exec "$@"', "sh", *COMMAND, *listening, *flags],
         cwd=folder,
         env=environment(),
         stdout=subprocess.PIPE,

@@ -21,7 +21,7 @@ def play(line: Line, settings: Settings) -> None:
         threading.Thread(target=_answer, args=(line, running), name="parent", daemon=True).start()
 
     try:
-        serve.run(settings, ready=ready)
+        serve.run(settings, ready=ready, signals=False)
     except CovistaError as error:
         line.send(Failed(str(error)))
 
