@@ -17,6 +17,8 @@ from covista_service.station.prospects import Depth
 _PAST_BOOTS = 16
 # A robot's clock that falls back by more than this was set; by less, the message is late.
 _CLOCK_SET_NS = nanoseconds(10)
+# When the current boot has been silent for so long, an earlier one that still sends is heard again.
+_BOOT_SILENT_NS = nanoseconds(5)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,6 +45,7 @@ class Robot:
     last_seen_ns: int | None = None
     clock_offset_ns: int | None = None
     boot: str | None = None
+    boot_heard_ns: int = 0
     past_boots: deque[str] = field(default_factory=lambda: deque(maxlen=_PAST_BOOTS))
     fix: Fix | None = None
     pose_sequence: int = -1
@@ -53,17 +56,29 @@ class Robot:
     last_problem: str | None = None
     ledgers: dict[Topic, Ledger] = field(default_factory=lambda: {"keyframe": Ledger(), "pose": Ledger()})
 
-    def enters(self, boot: str) -> bool:
-        """Take a boot for the current one, unless it has been superseded before; True if it is current now."""
-        if boot == self.boot:
-            return True
-        if boot in self.past_boots:
-            return False
-        if self.boot is not None:
-            self.past_boots.append(self.boot)
-        self.boot = boot
-        self.pose_sequence = -1
+    def enters(self, boot: str, arrived_ns: int) -> bool:
+        """Take the boot of a message for the current one; True if it is current now.
+
+        One that was superseded comes back only if the current one is over: a second sender under the same id, such as
+        a keyframe sent by hand, must not shut out the robot for good.
+        """
+        if boot != self.boot:
+            if boot in self.past_boots:
+                if not self._is_over(boot, arrived_ns):
+                    self.last_problem = f"boot {boot} sends beside boot {self.boot}: do two robots share this id?"
+                    return False
+                self.past_boots.remove(boot)
+            if self.boot is not None:
+                self.past_boots.append(self.boot)
+            self.boot = boot
+            self.pose_sequence = -1
+        self.boot_heard_ns = max(arrived_ns, self.boot_heard_ns)
         return True
+
+    def _is_over(self, boot: str, now_ns: int) -> bool:
+        """Is the current boot silent, and without a token that the other `boot` does not have?"""
+        alone = self.boot in self.tokens and boot not in self.tokens
+        return now_ns - self.boot_heard_ns >= _BOOT_SILENT_NS and not alone
 
     def locate(self, pose: Pose, time_ns: int, boot: str) -> bool:
         """Take a pose for the newest if it is, by sensor time within one boot."""

@@ -122,7 +122,7 @@ class Station:
         ledger, message = robot.ledgers["keyframe"], (keyframe.id.boot, keyframe.id.sequence)
         if not ledger.take(message):
             return []
-        if not robot.enters(keyframe.id.boot) or _older(keyframe, robot.arrived):
+        if not robot.enters(keyframe.id.boot, keyframe.arrived_ns) or _older(keyframe, robot.arrived):
             ledger.settle(message, "replaced")
             return []
         robot.arrived = keyframe
@@ -154,7 +154,7 @@ class Station:
         ledger, message = robot.ledgers["pose"], (event.boot, event.sequence)
         if not ledger.take(message):
             return
-        newest = robot.enters(event.boot) and event.sequence > robot.pose_sequence
+        newest = robot.enters(event.boot, event.arrived_ns) and event.sequence > robot.pose_sequence
         if newest:
             robot.pose_sequence = event.sequence
             newest = self._locate(robot, event.pose, event.time_ns, event.boot)

@@ -9,6 +9,7 @@ from covista_service.station.events import (
     KeyframeId,
     MessageDropped,
     MessagesReceived,
+    TokenSeen,
 )
 from covista_service.station.ledger import Counts
 from hypothesis import given, settings
@@ -120,6 +121,50 @@ def test_a_new_boot_starts_over_and_the_old_one_is_over() -> None:
     scene.send("r1", pose(3), boot="b0", sequence=8)
     assert scene.snapshot.robots["r1"].boot == "b1"
     assert counts(scene) == Counts(received=3, used=2, replaced=1, missing=7)
+
+
+def two_senders() -> Scene:
+    """A robot, and a keyframe of another boot sent under its id."""
+    scene = Scene()
+    scene.send("r1", pose(1), boot="b0")
+    scene.send("r1", pose(9), boot="hand")
+    return scene
+
+
+def test_two_senders_under_one_id_are_told_of() -> None:
+    scene = two_senders()
+    scene.send("r1", pose(2), boot="b0")
+    assert counts(scene) == Counts(received=3, used=2, replaced=1)
+    assert "do two robots share this id" in str(scene.snapshot.robots["r1"].last_problem)
+
+
+def test_a_robot_is_heard_again_when_the_other_sender_is_over() -> None:
+    scene = two_senders()
+    scene.wait(5)
+    scene.send("r1", pose(2), boot="b0")
+    scene.send_pose("r1", pose(3), boot="b0")
+    assert counts(scene) == Counts(received=3, used=3)
+    assert position_m(scene) == [3, 0, 0]
+
+
+def test_a_late_message_of_an_earlier_boot_does_not_bring_it_back_while_the_robot_is_there() -> None:
+    scene = Scene()
+    scene.send("r1", pose(1), boot="b0")
+    scene.receive(TokenSeen("r1", "b1"))
+    scene.send("r1", pose(2), boot="b1")
+    scene.wait(60)
+    scene.send("r1", pose(3), boot="b0")
+    assert scene.snapshot.robots["r1"].boot == "b1"
+    assert position_m(scene) == [2, 0, 0]
+
+
+def test_two_robots_that_both_send_for_ever_leave_nothing_behind() -> None:
+    scene = Scene()
+    for _ in range(40):
+        for boot in ("b0", "b1"):
+            scene.wait(6)
+            scene.send("r1", boot=boot)
+    assert counts(scene) == Counts(received=80, used=80)
 
 
 def test_a_repeated_keyframe_is_a_duplicate_and_used_once() -> None:
