@@ -31,13 +31,14 @@ def may_meet(
     Looks for a face of one frustum with the whole other frustum beyond it, so in rare cases it says yes to two that
     just miss each other.
     """
-    one = _Frustum(first, first_pose, first_near_far_m)
-    other = _Frustum(second, second_pose, second_near_far_m)
-    return not (one.has_face_before(other) or other.has_face_before(one))
+    return Frustum(first, first_pose, first_near_far_m).may_meet(Frustum(second, second_pose, second_near_far_m))
 
 
-class _Frustum:
-    """A view frustum in the world: corners (k, 3), directions (0 | 4, 3) in which it is endless, faces n . X <= d."""
+class Frustum:
+    """A view frustum in the world, built once and held against many others.
+
+    Corners (k, 3), directions (0 | 4, 3) in which it is endless, faces n . X <= d.
+    """
 
     def __init__(self, camera: Camera, pose: Pose, near_far_m: tuple[float, float]) -> None:
         near, far = near_far_m
@@ -56,7 +57,11 @@ class _Frustum:
         self.normals = np.vstack([sides, *ends])
         self.offsets = np.concatenate([at_centre, np.array(limits) + np.array(ends) @ pose.centre_m])
 
-    def has_face_before(self, other: _Frustum) -> bool:
+    def may_meet(self, other: Frustum) -> bool:
+        """As `may_meet`."""
+        return not (self._has_face_before(other) or other._has_face_before(self))
+
+    def _has_face_before(self, other: Frustum) -> bool:
         """Does a face have the whole other frustum on its outer side?"""
         beyond = (other.corners @ self.normals.T > self.offsets).all(axis=0)
         parting = (other.directions @ self.normals.T >= 0).all(axis=0)

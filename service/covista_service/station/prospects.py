@@ -9,6 +9,7 @@ import numpy as np
 
 from covista_service.perception import frustum
 from covista_service.perception.camera import Floats
+from covista_service.perception.frustum import Frustum
 from covista_service.station.events import Keyframe, KeyframeId
 
 _LEAST_POINTS = 8
@@ -40,11 +41,22 @@ def depth_of(keyframe: KeyframeId, depths_m: Floats) -> Depth | None:
     return Depth(keyframe, len(depths_m), float(near), float(median), float(far))
 
 
-def may_meet(first: Keyframe, first_depth: Depth | None, second: Keyframe, second_depth: Depth | None) -> bool:
-    """Can the two views meet, as far as is known? Unknown depths reach to infinity."""
-    return frustum.may_meet(
-        first.camera, first.pose, _range_m(first_depth), second.camera, second.pose, _range_m(second_depth)
-    )
+@dataclass(frozen=True, slots=True, eq=False)
+class Reach:
+    """What a keyframe can see, as far as is known. Built once, for it costs more than to hold it against another."""
+
+    keyframe: Keyframe
+    depth: Depth | None
+    frustum: Frustum
+
+    @classmethod
+    def of(cls, keyframe: Keyframe, depth: Depth | None) -> Reach:
+        """Unknown depths reach to infinity."""
+        return cls(keyframe, depth, Frustum(keyframe.camera, keyframe.pose, _range_m(depth)))
+
+    def is_of(self, keyframe: Keyframe, depth: Depth | None) -> bool:
+        """Is it that of this keyframe and depth, or outdated?"""
+        return self.keyframe is keyframe and self.depth == depth
 
 
 def predict(first: Keyframe, first_depth: Depth, second: Keyframe, second_depth: Depth) -> tuple[float, float]:

@@ -24,6 +24,7 @@ class Surveys:
         self._groups = groups
         self._agenda = Agenda(roster, pairs, options)
         self._to_judge: dict[str, None] = {}
+        self._reaches: dict[str, prospects.Reach] = {}
         # Keyframes in use that no survey has seen yet, and those whose first survey is in since the last evaluation.
         self._unseen: dict[str, dict[KeyframeId, Keyframe]] = {}
         self._seen: list[tuple[KeyframeId, int]] = []
@@ -94,6 +95,7 @@ class Surveys:
         self._agenda.forget(robot)
         self._pairs.forget(robot)
         self._to_judge.pop(robot, None)
+        self._reaches.pop(robot, None)
         self._unseen.pop(robot, None)
 
     def _judge(self, pair: Pair, now_ns: int) -> None:
@@ -103,10 +105,17 @@ class Surveys:
             return
         # What was seen in common is worth another look, if only to find that it is no more.
         overlapped = record.measured and sum(self._pairs.overlaps(pair) or ()) > 0
-        plausible = overlapped or prospects.may_meet(first.keyframe, first.depth, second.keyframe, second.depth)
+        reaches = self._reach(first, first.keyframe), self._reach(second, second.keyframe)
+        plausible = overlapped or reaches[0].frustum.may_meet(reaches[1].frustum)
         if not record.measured:
             self._expect(pair, now_ns, plausible=plausible)
         self._agenda.judge(pair, plausible=plausible)
+
+    def _reach(self, robot: Robot, keyframe: Keyframe) -> prospects.Reach:
+        held = self._reaches.get(robot.id)
+        if held is None or not held.is_of(keyframe, robot.depth):
+            held = self._reaches[robot.id] = prospects.Reach.of(keyframe, robot.depth)
+        return held
 
     def _expect(self, pair: Pair, now_ns: int, *, plausible: bool = True) -> None:
         """Answer from poses and depths, where both depths are known."""
