@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from covista_schemas.errors import CovistaError
@@ -37,6 +38,13 @@ def open_engine(url: str) -> Engine:
     if engine.dialect.name == "sqlite":
         event.listen(engine, "connect", _prepare_sqlite)
     return engine
+
+
+def file_is_gone(engine: Engine) -> bool:
+    """Whether the engine's database is a file of SQLite that is not there, or not any more."""
+    url = engine.url
+    plain = engine.dialect.name == "sqlite" and url.database and not url.database.startswith(("file:", ":memory:"))
+    return bool(plain) and not Path(str(url.database)).exists()
 
 
 def _prepare_sqlite(connection: Any, _record: object) -> None:

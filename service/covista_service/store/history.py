@@ -13,7 +13,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from covista_service import answers
 from covista_service.loop import News
 from covista_service.store import tables
-from covista_service.store.database import open_engine
+from covista_service.store.database import file_is_gone, open_engine
 from covista_service.store.tables import Entry, LastNumbers
 
 QUEUE = 10_000
@@ -105,6 +105,10 @@ class History:
                 pause_s = min(LONGEST_PAUSE_S, 2 * pause_s or self._first_pause_s)
 
     def _write(self, batch: list[Entry]) -> bool:
+        if file_is_gone(self._engine):
+            # SQLite would go on writing into the file that has no name any more.
+            self._engine.dispose()
+            self._prepared = False
         try:
             with self._engine.begin() as connection:
                 if not self._prepared:

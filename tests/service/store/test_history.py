@@ -94,6 +94,19 @@ def test_a_path_that_cannot_be_opened_degrades_and_heals(tmp_path: Path) -> None
     assert rows(folder / "covista.db", "select count(*) from events") == [(len(news.events),)]
 
 
+def test_a_file_that_was_removed_is_begun_anew(file: Path) -> None:
+    history = History(url(file))
+    news = news_of(two_robots())
+    history.take(news)
+    wait_until(lambda: history.health().detail != "0 entries written", "the first entries are written")
+    for each in file.parent.glob("covista.db*"):
+        each.unlink()
+    history.take(news)
+    history.close()
+    assert history.health().status == "ready"
+    assert rows(file, "select count(*) from events") == [(len(news.events),)]
+
+
 def test_a_file_that_is_no_database_never_stops_the_station(file: Path) -> None:
     file.write_bytes(b"this is no database, but a text of some length" * 100)
     history = History(url(file), first_pause_s=QUICK_S)
