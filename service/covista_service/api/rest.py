@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.metadata import version
 
 from fastapi import APIRouter, FastAPI
-from starlette.types import Lifespan
+from starlette.types import ASGIApp, Lifespan, Receive, Scope, Send
 
 from covista_service.api import contract, errors, groups, health, pairs, robots, similarity
 
@@ -25,6 +25,17 @@ def build(lifespan: Lifespan[FastAPI] | None = None) -> FastAPI:
     app.include_router(nouns)
     app.include_router(health.router)
     errors.install(app)
+    app.add_middleware(_head_as_get)
     # FastAPI's way to replace its own description is to assign the method.
     setattr(app, "openapi", contract.describe(app))  # noqa: B010 - mypy refuses the plain assignment
     return app
+
+
+def _head_as_get(app: ASGIApp) -> ASGIApp:
+    """HEAD wherever GET is (RFC 9110); the server, which knows what was asked, leaves the content out."""
+
+    async def answer(scope: Scope, receive: Receive, send: Send) -> None:
+        asked_for_head = scope["type"] == "http" and scope["method"] == "HEAD"
+        await app({**scope, "method": "GET"} if asked_for_head else scope, receive, send)
+
+    return answer

@@ -124,3 +124,10 @@ def test_who_has_this_version_is_not_sent_it_again(path: str) -> None:
     changed = desk.get(path, **{"if-none-match": tag})
     assert changed.status_code == 200
     assert changed.headers["etag"] != tag
+
+
+@pytest.mark.parametrize("path", ["/robots", "/pairs/r1/r2", "/groups", "/similarity", "/robots/r99"])
+def test_head_is_answered_as_get_is(desk: Desk, path: str) -> None:
+    asked, known = desk.ask(f"/api/v1{path}", "HEAD"), desk.get(path)
+    assert asked.status_code == known.status_code
+    assert asked.headers["content-type"] == known.headers["content-type"]
