@@ -15,8 +15,10 @@ from covista_service.drawing.canvas import Picture
 from covista_service.perception.camera import Camera, Floats, undistort
 from covista_service.station.events import Keyframe
 
-# Small pictures are enlarged, so that lines and words can be read.
+# Small pictures are enlarged, so that lines and words can be read; large ones are reduced, and a camera may claim any
+# size as long as it sends features only.
 _LEAST_WIDTH_PX = 640
+_MOST_PX = 2048
 _CAPTION_PX = 28
 _DIMMED = 0.35
 _NEUTRAL = 96
@@ -33,24 +35,34 @@ class CommonField:
 
 def overlay(keyframe: Keyframe, common: CommonField | None, caption: str) -> bytes:
     """PNG of the keyframe with the common field and a caption; None for a pair whose field is not known."""
-    ground, scale = _enlarged(_ground(keyframe))
+    scale = _scale(keyframe.camera)
+    ground = _ground(keyframe, scale)
     if common is not None:
         ground = _draw(ground, common, scale)
     return canvas.png(_captioned(ground, caption))
 
 
-def _ground(keyframe: Keyframe) -> Picture:
+def _scale(camera: Camera) -> float:
+    """Pixels drawn per pixel of the camera."""
+    enlarged = max(1, -(-_LEAST_WIDTH_PX // camera.width))
+    return min(float(enlarged), _MOST_PX / max(camera.width, camera.height))
+
+
+def _ground(keyframe: Keyframe, scale: float) -> Picture:
     """The ideal (undistorted) picture to draw on; without an image its thumbnail, or its keypoints on grey."""
     camera = keyframe.camera
+    width, height = (max(1, round(length * scale)) for length in (camera.width, camera.height))
     for data in (keyframe.image, keyframe.thumbnail):
         picture = _decode(data) if data else None
         if picture is not None:
-            full = cv2.resize(picture, (camera.width, camera.height), interpolation=cv2.INTER_CUBIC)
-            return _undistorted(np.asarray(full, np.uint8), camera)
-    neutral: Picture = np.full((camera.height, camera.width, 3), _NEUTRAL, np.uint8)
+            way = cv2.INTER_AREA if picture.shape[1] > width else cv2.INTER_CUBIC
+            return _undistorted(
+                np.asarray(cv2.resize(picture, (width, height), interpolation=way), np.uint8), camera, scale
+            )
+    neutral: Picture = np.full((height, width, 3), _NEUTRAL, np.uint8)
     if keyframe.features is not None:
-        for point_px in undistort(camera, keyframe.features.keypoints_px):
-            canvas.dot(neutral, point_px, 0.5, canvas.GREY, canvas.GREY)
+        for point_px in _scaled(undistort(camera, keyframe.features.keypoints_px), scale):
+            canvas.dot(neutral, point_px, max(0.5, 0.5 * scale), canvas.GREY, canvas.GREY)
     return neutral
 
 
@@ -59,27 +71,23 @@ def _decode(data: bytes) -> Picture | None:
     return None if picture is None else np.asarray(picture, np.uint8)
 
 
-def _undistorted(picture: Picture, camera: Camera) -> Picture:
+def _undistorted(picture: Picture, camera: Camera, scale: float) -> Picture:
+    """The picture, which is `scale` times as large as the camera's, without the lens's distortion."""
     coefficients = np.array(camera.coefficients, np.float64)
+    matrix = camera.matrix.copy()
+    matrix[:2] *= scale
+    matrix[:2, 2] = _scaled(camera.matrix[:2, 2], scale)
     match camera.distortion:
         case "none":
             return picture
         case "plumb_bob":
-            ideal = cv2.undistort(picture, camera.matrix, coefficients)
+            ideal = cv2.undistort(picture, matrix, coefficients)
         case "equidistant":
-            ideal = cv2.fisheye.undistortImage(picture, camera.matrix, coefficients, Knew=camera.matrix)
+            ideal = cv2.fisheye.undistortImage(picture, matrix, coefficients, Knew=matrix)
     return np.asarray(ideal, np.uint8)
 
 
-def _enlarged(picture: Picture) -> tuple[Picture, int]:
-    scale = max(1, -(-_LEAST_WIDTH_PX // picture.shape[1]))
-    if scale == 1:
-        return picture.copy(), 1
-    size = (picture.shape[1] * scale, picture.shape[0] * scale)
-    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_CUBIC), np.uint8), scale
-
-
-def _draw(ground: Picture, common: CommonField, scale: int) -> Picture:
+def _draw(ground: Picture, common: CommonField, scale: float) -> Picture:
     polygons_px = [_scaled(polygon, scale) for polygon in common.polygons_px]
     seen = canvas.mask_of(ground.shape[:2], polygons_px).astype(np.float32)[..., None] / 255.0
     grey = cv2.cvtColor(cv2.cvtColor(ground, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
@@ -93,8 +101,8 @@ def _draw(ground: Picture, common: CommonField, scale: int) -> Picture:
     return drawn
 
 
-def _scaled(points_px: Floats, scale: int) -> Floats:
-    """Places in the enlarged picture; pixel centres are at integers."""
+def _scaled(points_px: Floats, scale: float) -> Floats:
+    """Places in the picture as drawn; pixel centres are at integers."""
     return np.asarray((points_px + 0.5) * scale - 0.5, np.float64)
 
 

@@ -127,3 +127,11 @@ def test_the_map_shows_robots_groups_and_walls() -> None:
 
 def test_a_map_of_nobody_is_a_map() -> None:
     drawn(swarm_map(RobotsReport(robots=[]), PairsReport(pairs=[]), groups_of()))
+
+
+@pytest.mark.parametrize("size", [(65_535, 65_535), (1, 65_535), (4000, 3000)])
+def test_a_picture_stays_of_a_size_whatever_the_camera_claims(size: tuple[int, int]) -> None:
+    corner = Features("orb", np.zeros((1, 2), np.float32), np.zeros((1, 32), np.uint8))
+    for bare in (keyframe(Camera(MATRIX, *size), features=corner), keyframe(Camera(MATRIX, *size), thumbnail=IMAGE)):
+        found = drawn(overlay(bare, CommonField((LEFT_HALF,)), "large"))
+        assert max(found.shape) <= 2048 + 64
