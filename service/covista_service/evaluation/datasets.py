@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
+from zipfile import BadZipFile
 
 import cv2
 import imagesize
@@ -144,9 +145,10 @@ def _depths(dataset: Dataset) -> Iterator[Floats]:
 
 def _array(path: Path, key: str) -> Floats:
     try:
-        with np.load(path) as arrays:
+        with path.open("rb") as file, np.load(file) as arrays:
             return np.asarray(arrays[key], np.float64)[::_DEPTH_STEP, ::_DEPTH_STEP]
-    except (OSError, ValueError, KeyError) as error:
+    except (OSError, EOFError, BadZipFile, ValueError, KeyError, TypeError, IndexError) as error:
+        # No archive, cut short, no such key, a single array instead of an archive, or an array of one dimension.
         raise DatasetError(path, key, f"no such array of disparities: {error}") from error
 
 

@@ -171,3 +171,24 @@ def test_pairs_of_the_shared_recordings(name: str, pairs: int, ordered: int) -> 
     for a, b in dataset.pairs:
         compared[a, b] = compared[b, a] = True
     assert (compared | ~defined).all()
+
+
+@pytest.mark.parametrize("content", ["none", "empty", "cut", "one array", "one row"])
+def test_a_broken_disparity_is_named(tmp_path: Path, content: str) -> None:
+    frames = [{k: v for k, v in recording.frame(i, 0).items() if k != "depth"} for i in range(2)]
+    kind: dict[str, object] = {"kind": "stereo_disparity", "disparity": "d.npz", "focal_px": 300.0, "baseline_m": 0.5}
+    folder = recording.write(tmp_path, frames=frames, **kind)
+    match content:
+        case "none":
+            np.savez(folder / "d.npz", other=np.ones((4, 4)))
+        case "empty":
+            (folder / "d.npz").write_bytes(b"")
+        case "cut":
+            (folder / "d.npz").write_bytes(b"PK\x03\x04 and no more")
+        case "one array":
+            with (folder / "d.npz").open("wb") as file:
+                np.save(file, np.ones((4, 4)))
+        case "one row":
+            np.savez(folder / "d.npz", arr_0=np.ones(4))
+    with pytest.raises(DatasetError, match=r"d\.npz: arr_0"):
+        median_depth(load(folder))
