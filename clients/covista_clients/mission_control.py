@@ -45,6 +45,8 @@ class MissionControl:
             self._client = httpx.Client(base_url=url, headers=headers, timeout=timeout_s, transport=transport)
         except httpx.InvalidURL as error:
             raise ApiError(f"{url!r} is not a URL", detail=str(error)) from error
+        except UnicodeEncodeError as error:
+            raise ApiError("the token holds what no token holds", detail="only ASCII can be sent") from error
 
     def robots(self) -> RobotsReport:
         """All robots."""

@@ -114,3 +114,8 @@ def test_whatever_happens_is_an_api_error(
 def test_an_address_that_is_none_is_an_api_error(url: str) -> None:
     with pytest.raises(ApiError), MissionControl(url) as control:
         control.groups()
+
+
+def test_a_token_that_cannot_be_sent_is_an_error_of_ours() -> None:
+    with pytest.raises(ApiError, match="token"):
+        MissionControl(token="schlüssel")

@@ -25,15 +25,11 @@ _ASK_EVERY_S = 0.05
 
 
 def send(
-    image: Annotated[Path, typer.Argument(help="JPEG, PNG or WebP file.", exists=True, dir_okay=False)],
+    image: Annotated[Path, typer.Argument(help="JPEG, PNG or WebP file.")],
     robot: Annotated[str, typer.Option(help="Id of the robot that took it.")],
     camera: Annotated[
         Path,
-        typer.Option(
-            help="JSON file with fx, fy, cx, cy, width, height, perhaps distortion {model, coefficients}.",
-            exists=True,
-            dir_okay=False,
-        ),
+        typer.Option(help="JSON file with fx, fy, cx, cy, width, height, perhaps distortion {model, coefficients}."),
     ],
     pose: Annotated[str, typer.Option(help='"x y z qx qy qz qw": metres, and the unit quaternion world_from_camera.')],
     connect: Connect = DEFAULT_CONNECT,
@@ -41,7 +37,7 @@ def send(
     site: Site = "default",
 ) -> None:
     """Send one keyframe, and end well when the station has confirmed it."""
-    picture, taken_by, taken_from = image.read_bytes(), _read_camera(camera), _read_pose(pose)
+    picture, taken_by, taken_from = _read(image), _read_camera(camera), _read_pose(pose)
     deadline_s = time.monotonic() + wait
     try:
         session = zenoh.open(config("client", connect=[connect], timeout_ms=round(wait * 1000)))
@@ -63,9 +59,16 @@ def _left_at_once(rover: Rover) -> Iterator[Rover]:
         rover.close(wait_s=0)
 
 
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise CovistaError(f"{path} cannot be read: {error.strerror}") from error
+
+
 def _read_camera(path: Path) -> Camera:
     try:
-        return Camera.model_validate_json(path.read_bytes())
+        return Camera.model_validate_json(_read(path))
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(str(part) for part in first["loc"]) or "camera"

@@ -28,7 +28,7 @@ WorldName = Annotated[str, typer.Option("--world", help="corner, boxes, shelf, w
 def swarm(
     robots: Annotated[int, typer.Option(min=1, help="How many rovers.")] = 6,
     world: WorldName = "arena",
-    seed: Annotated[int, typer.Option(help="The same seed gives the same swarm.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same swarm.")] = 0,
     rate: Annotated[float, typer.Option(help="Keyframes per second and rover.")] = 2.0,
     connect: Connect = DEFAULT_CONNECT,
     site: Site = "default",
@@ -52,7 +52,7 @@ def render(
     world: Annotated[str, typer.Argument(help="corner, boxes, shelf, wall or arena.")],
     out: Annotated[Path, typer.Option(help="Folder to write into; made if it is not there.", file_okay=False)],
     cameras: Annotated[int, typer.Option(min=1, help="How many views.")] = 6,
-    seed: Annotated[int, typer.Option(help="The same seed gives the same folder.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same folder.")] = 0,
 ) -> None:
     """Write views of a rendered world with exact depth and true overlap into a folder."""
     with _simulation("covista render"):

@@ -120,3 +120,11 @@ def test_a_file_that_is_no_picture_is_one_line(run: Run, endpoint: str, ground: 
     code, _, err = run("send", camera, "--robot", "r1", "--camera", camera, "--pose", POSE, "--connect", endpoint)
     assert code == 1
     assert err == "covista: image: bytes that are neither JPEG, PNG nor WebP\n"
+
+
+def test_a_file_that_is_not_there_is_one_line(run: Run, picture: Path, camera: Path, tmp_path: Path) -> None:
+    for image, intrinsics in ((tmp_path / "none.png", camera), (picture, tmp_path / "none.json"), (tmp_path, camera)):
+        code, out, err = run("send", image, "--robot", "r1", "--camera", intrinsics, "--pose", POSE)
+        assert (code, out) == (1, "")
+        assert len(err.splitlines()) == 1
+        assert "cannot be read" in err

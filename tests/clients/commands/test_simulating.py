@@ -63,3 +63,10 @@ def test_without_opencv_it_says_what_to_install(run: Run, monkeypatch: pytest.Mo
     code, _, err = run("swarm")
     assert code == 1
     assert err == "covista: covista swarm needs an optional extra: pip install 'covista[vision]'\n"
+
+
+@pytest.mark.parametrize("arguments", [("swarm", "--seconds", "0"), ("render", "wall", "--out", ".")])
+def test_a_seed_is_not_negative(run: Run, arguments: tuple[str, ...]) -> None:
+    code, out, err = run(*arguments, "--seed", "-1")
+    assert (code, out) == (2, "")
+    assert "--seed" in err
