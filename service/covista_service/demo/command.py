@@ -26,13 +26,15 @@ def demo(
     seconds: Annotated[
         float | None, typer.Option(min=0, help="How long; without it until Ctrl-C.", show_default=False)
     ] = None,
-    seed: Annotated[int, typer.Option(help="The same seed gives the same swarm.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same swarm.")] = 0,
     api: Annotated[str, typer.Option(metavar="HOST:PORT", help="Where the REST interface listens.")] = "127.0.0.1:8000",
     link: Annotated[str, typer.Option(metavar="ENDPOINT", help="Where zenoh listens.")] = "tcp/127.0.0.1:7447",
     database: Annotated[
         str | None, typer.Option(metavar="URL", help="Keep the history there.  [default: a temporary file]")
     ] = None,
-    report: Annotated[Path | None, typer.Option(metavar="FILE", help="Write what came of it, as JSON.")] = None,
+    report: Annotated[
+        Path | None, typer.Option(metavar="FILE", dir_okay=False, writable=True, help="Write what came of it, as JSON.")
+    ] = None,
 ) -> None:
     """Show a station and a simulated swarm at work, each a process of its own."""
     from covista_clients.simulation.swarm import SwarmOptions
