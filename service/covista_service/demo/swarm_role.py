@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import threading
-from typing import Literal
 
 from covista_clients.simulation.swarm import KeyframeRecord, SwarmOptions, run_swarm
 
 from covista_service.demo.children import Line, end_soon
 
-Order = Literal["quiet", "leave"]
-
 
 def play(line: Line, options: SwarmOptions) -> None:
-    """Drive; every keyframe that was put goes to the parent as a KeyframeRecord, and at the end `None`."""
+    """Drive; every keyframe that is handed to its rover goes to the parent as a KeyframeRecord."""
     quiet, leave = threading.Event(), threading.Event()
     listener = threading.Thread(target=_obey, args=(line, quiet, leave), name="orders", daemon=True)
     listener.start()
@@ -25,11 +22,9 @@ def play(line: Line, options: SwarmOptions) -> None:
 
 
 def _obey(line: Line, quiet: threading.Event, leave: threading.Event) -> None:
-    """Pass orders on; a line that closes is the order to leave, at once."""
-    while (order := line.receive()) is not None:
+    """Any word is the order to fall silent; a line that closes is the order to leave, at once."""
+    while line.receive() is not None:
         quiet.set()
-        if order == "leave":
-            leave.set()
     end_soon()
     quiet.set()
     leave.set()
