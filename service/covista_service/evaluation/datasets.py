@@ -79,7 +79,10 @@ def _frame(folder: Path, file: DatasetFile, index: int) -> Frame:
     entry, where = file.frames[index], f"frames.{index}"
     image = folder / entry.image
     _must_exist(folder, entry.image, f"{where}.image")
-    width, height = imagesize.get(image)
+    try:
+        width, height = imagesize.get(image, exif_rotation=False)
+    except ValueError as error:
+        raise DatasetError(image, "", f"unreadable head: {error}") from error
     if width <= 0 or height <= 0:
         raise DatasetError(image, "", "not an image of a known format")
     camera = pose = None

@@ -192,3 +192,14 @@ def test_a_broken_disparity_is_named(tmp_path: Path, content: str) -> None:
             np.savez(folder / "d.npz", arr_0=np.ones(4))
     with pytest.raises(DatasetError, match=r"d\.npz: arr_0"):
         median_depth(load(folder))
+
+
+def test_the_size_is_that_of_the_pixels_as_stored(tmp_path: Path) -> None:
+    folder = recording.write(tmp_path)
+    plain = cv2.imencode(".jpg", np.zeros((240, 320, 3), np.uint8))[1].tobytes()
+    tiff = b"MM\x00*\x00\x00\x00\x08\x00\x01\x01\x12\x00\x03\x00\x00\x00\x01\x00\x06\x00\x00\x00\x00\x00\x00"
+    turned = b"\xff\xe1" + (len(tiff) + 8).to_bytes(2) + b"Exif\x00\x00" + tiff
+    (folder / recording.frame(0, 0)["image"]).write_bytes(plain[:2] + turned + plain[2:])
+    camera = load(folder).frames[0].camera
+    assert camera is not None
+    assert (camera.width, camera.height) == (320, 240)
