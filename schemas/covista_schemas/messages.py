@@ -36,7 +36,8 @@ class FeatureKind(StrEnum):
 DESCRIPTOR_BYTES: dict[FeatureKind, int] = {FeatureKind.ROOTSIFT: 128, FeatureKind.ORB: 32}
 # RootSIFT descriptors have unit length; in bytes 512 stands for 1, and what saturates at 255 is rare.
 ROOTSIFT_SCALE = 512.0
-MAX_FEATURES = 20_000
+# Matching compares every feature with every other one: this many bound the memory of a survey to some 100 MB a matrix.
+MAX_FEATURES = 5_000
 MAX_THUMBNAIL_BYTES = 64 * 1024
 
 
