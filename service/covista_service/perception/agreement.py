@@ -1,0 +1,199 @@
+"""What a keyframe's pairs agree on: depths of its keypoints, merged and sifted.
+
+Wrong points ruin a surface, not the interpolation between right ones. So a depth counts in full only where two pairs
+tell the same, and one that was seen once must fit its neighbours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from covista_service.perception.camera import Floats
+from covista_service.perception.compiled import compiled
+
+Mask = NDArray[np.bool_]
+AGREED, SINGLE, CONTRADICTED = 1.0, 0.4, 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class AgreementOptions:
+    """Two inverse depths agree within `sigmas` sigma and `tolerance` of themselves.
+
+    A point that was seen once stays if enough of its `neighbours` within `reach` image widths, weighted by confidence
+    and nearness (softened by `softening` widths), agree with it: `support_free` if its match was found without the
+    geometry, else `support_guided`. Only where at least `least_agreed` keypoints, and that share of all, are agreed:
+    else singles are all there is.
+    """
+
+    tolerance: float = 0.03
+    sigmas: float = 3.0
+    neighbours: int = 12
+    reach: float = 0.2
+    softening: float = 0.03
+    support_tolerance: float = 0.10
+    support_sigmas: float = 2.0
+    support_free: float = 0.4
+    support_guided: float = 0.5
+    least_agreed: int = 20
+    least_agreed_share: float = 0.15
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observations:
+    """Depths that one pair gives one keyframe.
+
+    `keypoints` (n,) indices, `inverse_depths` (n,) 1/m, their `sigmas` (n,), and `free` (n,): whether the match was
+    found without the help of the geometry.
+    """
+
+    keypoints: NDArray[np.int64]
+    inverse_depths: Floats
+    sigmas: Floats
+    free: Mask
+
+    def __len__(self) -> int:
+        return len(self.keypoints)
+
+    def only(self, chosen: Mask) -> Observations:
+        """Those where `chosen` (n,) is true."""
+        return Observations(*(getattr(self, name)[chosen] for name in self.__slots__))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DepthPoints:
+    """Points of an image with a depth: `positions_px` (n, 2), `inverse_depths`, `sigmas`, `confidences` (n,)."""
+
+    positions_px: Floats
+    inverse_depths: Floats
+    sigmas: Floats
+    confidences: Floats
+
+    def __len__(self) -> int:
+        return len(self.positions_px)
+
+
+def agree(
+    observations: Sequence[Observations], keypoints_px: Floats, width_px: int, options: AgreementOptions
+) -> DepthPoints:
+    """Merge what all pairs of a keyframe say of its keypoints (k, 2), and drop singles that nothing supports."""
+    if not any(len(one) for one in observations):
+        return DepthPoints(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0))
+    keypoint = np.concatenate([one.keypoints for one in observations])
+    order = np.argsort(keypoint, kind="stable")
+    which, merged, free = _merge(
+        keypoint[order],
+        np.concatenate([one.inverse_depths for one in observations])[order],
+        np.concatenate([one.sigmas for one in observations])[order],
+        np.concatenate([one.free for one in observations])[order],
+        options.tolerance,
+        options.sigmas,
+    )
+    points = DepthPoints(keypoints_px[which], *np.ascontiguousarray(merged.T))
+    kept = _supported(points, free, width_px, options)
+    return DepthPoints(*(getattr(points, name)[kept] for name in points.__slots__))
+
+
+def _supported(points: DepthPoints, free: Mask, width_px: int, options: AgreementOptions) -> Mask:
+    agreed = points.confidences == AGREED
+    if agreed.sum() < options.least_agreed or agreed.mean() < options.least_agreed_share:
+        return np.ones(len(points), np.bool_)
+    count = min(options.neighbours + 1, len(points))
+    reach = options.reach * width_px
+    distance, index = KDTree(points.positions_px).query(points.positions_px, count, distance_upper_bound=reach)
+    share = _support(
+        np.asarray(distance, np.float64)[:, 1:],
+        np.asarray(index, np.int64)[:, 1:],
+        points.inverse_depths,
+        points.sigmas,
+        points.confidences,
+        (options.softening * width_px) ** 2,
+        options.support_tolerance,
+        options.support_sigmas,
+    )
+    lenient = free & (points.confidences != CONTRADICTED)
+    needed = np.where(lenient, options.support_free, options.support_guided)
+    return np.asarray(agreed | (share >= needed), np.bool_)
+
+
+@compiled
+def _merge(
+    keypoint: NDArray[np.int64], rho: Floats, sigma: Floats, free: Mask, tolerance: float, sigmas: float
+) -> tuple[NDArray[np.int64], Floats, Mask]:
+    """The largest agreeing set of each keypoint, input sorted by keypoint: inverse depth, sigma, confidence."""
+    total = len(keypoint)
+    which = np.empty(total, np.int64)
+    merged = np.empty((total, 3))
+    any_free = np.zeros(total, np.bool_)
+    count = 0
+    start = 0
+    while start < total:
+        end = start
+        while end < total and keypoint[end] == keypoint[start]:
+            any_free[count] |= free[end]
+            end += 1
+        which[count] = keypoint[start]
+        merged[count] = _largest_set(rho[start:end], sigma[start:end], tolerance, sigmas)
+        count += 1
+        start = end
+    return which[:count], merged[:count], any_free[:count]
+
+
+@compiled
+def _largest_set(rho: Floats, sigma: Floats, tolerance: float, sigmas: float) -> Floats:
+    """Inverse depth, sigma and confidence of the largest set that agrees with one of its members."""
+    best, most = 0, 0
+    for i in range(len(rho)):
+        agreeing = 0
+        for j in range(len(rho)):
+            agreeing += _agrees(rho[i], sigma[i], rho[j], sigma[j], tolerance, sigmas)
+        if agreeing > most or (agreeing == most and sigma[i] < sigma[best]):
+            best, most = i, agreeing
+    weights, weighted = 0.0, 0.0
+    for j in range(len(rho)):
+        if _agrees(rho[best], sigma[best], rho[j], sigma[j], tolerance, sigmas):
+            weights += 1 / sigma[j] ** 2
+            weighted += rho[j] / sigma[j] ** 2
+    confidence = SINGLE if len(rho) == 1 else CONTRADICTED
+    if most >= 2 and 2 * most > len(rho):
+        confidence = AGREED
+    return np.array([weighted / weights, 1 / np.sqrt(weights), confidence])
+
+
+@compiled
+def _agrees(one: float, one_sigma: float, other: float, other_sigma: float, tolerance: float, sigmas: float) -> bool:
+    room = sigmas * np.sqrt(one_sigma**2 + other_sigma**2) + tolerance * max(one, other)
+    return bool(abs(one - other) < room)
+
+
+@compiled
+def _support(
+    distance: Floats,
+    index: NDArray[np.int64],
+    rho: Floats,
+    sigma: Floats,
+    confidence: Floats,
+    softening: float,
+    tolerance: float,
+    sigmas: float,
+) -> Floats:
+    """Weighted share (n,) of each point's neighbours that agree with it; an index of n is no neighbour."""
+    n, k = index.shape
+    share = np.zeros(n)
+    for i in range(n):
+        agreeing, weights = 0.0, 0.0
+        for c in range(k):
+            j = index[i, c]
+            if j >= n:
+                break
+            weight = confidence[j] / (distance[i, c] ** 2 + softening)
+            weights += weight
+            if abs(rho[j] - rho[i]) < tolerance * rho[i] + sigmas * np.sqrt(sigma[i] ** 2 + sigma[j] ** 2):
+                agreeing += weight
+        if weights > 0:
+            share[i] = agreeing / weights
+    return share
