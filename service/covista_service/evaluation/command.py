@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 class MethodName(StrEnum):
     """Names of `methods.METHODS`, known without importing them."""
 
+    AUTO = "auto"
     PLANES = "planes"
+    SURFACE = "surface"
     FRUSTUM = "frustum"
 
 
@@ -33,10 +35,10 @@ _WIDTH = 110
 def evaluate(
     folders: Annotated[list[Path], typer.Argument(metavar="FOLDER...", help="Sets of images with known overlap.")],
     method: Annotated[
-        list[MethodName] | None, typer.Option(help="How to measure; may be given again. \\[default: planes]")
+        list[MethodName] | None, typer.Option(help="How to measure; may be given again. \\[default: auto]")
     ] = None,
     input: Annotated[  # noqa: A002 - the flag's name
-        Literal["images", "features"], typer.Option(help="What a method is given of each image.")
+        Literal["images", "features", "features+thumbnails"], typer.Option(help="What a method is given of each image.")
     ] = "images",
     features: Annotated[Literal["rootsift", "orb"], typer.Option(help="Kind of features.")] = "rootsift",
     pose_noise: Annotated[
@@ -55,7 +57,7 @@ def evaluate(
     from covista_service.evaluation.run import RunOptions
 
     options = RunOptions(
-        tuple(dict.fromkeys(method or [MethodName.PLANES])),
+        tuple(dict.fromkeys(method or [MethodName.AUTO])),
         input,
         FeatureKind(features),
         _parse_noise(pose_noise),

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from covista_service.evaluation.case import Answer, Case, Pair
 from covista_service.perception import frustum
 from covista_service.perception.camera import Floats, View
+from covista_service.perception.scene import SceneOptions, reconstruct
 from covista_service.perception.survey import Outcome, Survey
 
 Method = Callable[[Case], dict[Pair, Answer]]
@@ -31,7 +33,36 @@ def frustums(case: Case) -> dict[Pair, Answer]:
     return {(a, b): _frustum(case.views[a], depths.get(a), case.views[b], depths.get(b)) for a, b in case.pairs}
 
 
-METHODS: Mapping[str, Method] = {"planes": planes, "frustum": frustums}
+def surfaces(case: Case) -> dict[Pair, Answer]:
+    """A surface per keyframe from the features of all its pairs, with poses that agree across pairs."""
+    if case.views is None:
+        return dict.fromkeys(case.pairs, NO_CAMERA)
+    return _surfaces([replace(view, thumbnail=None) for view in case.views], case.pairs)
+
+
+def auto(case: Case) -> dict[Pair, Answer]:
+    """Surfaces, with the thumbnail's grey where there is one."""
+    return dict.fromkeys(case.pairs, NO_CAMERA) if case.views is None else _surfaces(case.views, case.pairs)
+
+
+METHODS: Mapping[str, Method] = {"auto": auto, "planes": planes, "surface": surfaces, "frustum": frustums}
+
+
+def _surfaces(views: Sequence[View], pairs: Sequence[Pair]) -> dict[Pair, Answer]:
+    """Every pair costs its share of what all keyframes together took."""
+    start = time.perf_counter_ns()
+    scene = reconstruct(views, pairs, SceneOptions())
+    overlaps = {pair: scene.overlap(*pair) for pair in pairs}
+    ms = (time.perf_counter_ns() - start) / 1e6 / max(len(pairs), 1)
+    return {pair: _surface(overlaps[pair], scene.matched.get(pair, 0), ms) for pair in pairs}
+
+
+def _surface(overlaps: tuple[float, float] | None, matched: int, ms: float) -> Answer:
+    if overlaps is None:
+        return NO_DEPTH
+    if matched:
+        return Answer("image", "measured", *overlaps, inliers=matched, ms=ms)
+    return Answer("predicted", "predicted", *overlaps, ms=ms)
 
 
 def _planes(found: Survey, ms: float) -> Answer:

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from covista_schemas import features
 from covista_schemas.messages import FeatureKind
+from numpy.typing import NDArray
 
 from covista_service.evaluation import methods
 from covista_service.evaluation.case import Answer, Pair, surveyed
@@ -19,14 +20,15 @@ from covista_service.evaluation.noise import NO_NOISE, PoseNoise, disturbed
 from covista_service.perception.camera import Features, Floats, Pose, View
 from covista_service.perception.survey import SurveyOptions
 
-Input = Literal["images", "features"]
+Input = Literal["images", "features", "features+thumbnails"]
+_Extracted = tuple[Features, NDArray[np.uint8] | None]
 
 
 @dataclass(frozen=True, slots=True)
 class RunOptions:
     """What to run: method names of `methods.METHODS`, each over every seed."""
 
-    methods: tuple[str, ...] = ("planes",)
+    methods: tuple[str, ...] = ("auto",)
     input: Input = "images"
     features: FeatureKind = FeatureKind.ROOTSIFT
     noise: PoseNoise = NO_NOISE
@@ -60,7 +62,7 @@ class Evaluation:
 
 def evaluate(dataset: Dataset, options: RunOptions, advance: Callable[[], None] = lambda: None) -> Iterator[Evaluation]:
     """An evaluation for each seed and method; `advance` is called `steps` times on the way."""
-    extracted = _features(dataset, options.features, advance)
+    extracted = _extracted(dataset, options, advance)
     for seed in range(options.seeds):
         poses = _poses(dataset, options.noise, np.random.default_rng(seed))
         case = surveyed(dataset.pairs, _views(dataset, poses, extracted), SurveyOptions(seed=seed), advance)
@@ -101,13 +103,21 @@ def _has_cameras(dataset: Dataset) -> bool:
     return all(frame.camera is not None and frame.pose is not None for frame in dataset.frames)
 
 
-def _features(dataset: Dataset, kind: FeatureKind, advance: Callable[[], None]) -> list[Features]:
-    extracted = []
+def _extracted(dataset: Dataset, options: RunOptions, advance: Callable[[], None]) -> list[_Extracted]:
+    """Features, and the small grey picture that a rover would send with them: from images it can always be made."""
+    extracted: list[_Extracted] = []
     for frame in dataset.frames if _has_cameras(dataset) else ():
-        found = features.extract(picture(frame), kind)
-        extracted.append(Features(str(found.kind), found.keypoints_px, found.descriptors))
+        image = picture(frame)
+        found = features.extract(image, options.features)
+        grey = None if options.input == "features" else _grey(features.thumbnail(image))
+        extracted.append((Features(str(found.kind), found.keypoints_px, found.descriptors), grey))
         advance()
     return extracted
+
+
+def _grey(jpeg: bytes) -> NDArray[np.uint8]:
+    """A grey JPEG's picture (h, w): all its channels are alike."""
+    return np.ascontiguousarray(features.decode_image(jpeg)[:, :, 0])
 
 
 def _poses(dataset: Dataset, noise: PoseNoise, rng: np.random.Generator) -> list[Pose]:
@@ -120,11 +130,13 @@ def _poses(dataset: Dataset, noise: PoseNoise, rng: np.random.Generator) -> list
     return [disturbed(pose, noise, depth, rng) for pose in reported]
 
 
-def _views(dataset: Dataset, poses: Sequence[Pose], extracted: Sequence[Features]) -> tuple[View, ...] | None:
+def _views(dataset: Dataset, poses: Sequence[Pose], extracted: Sequence[_Extracted]) -> tuple[View, ...] | None:
     cameras = [frame.camera for frame in dataset.frames if frame.camera is not None]
     if not _has_cameras(dataset):
         return None
-    return tuple(View(*parts) for parts in zip(cameras, poses, extracted, strict=True))
+    return tuple(
+        View(camera, pose, found, grey) for camera, pose, (found, grey) in zip(cameras, poses, extracted, strict=True)
+    )
 
 
 def _fields(record: Answer | Metrics) -> dict[str, object]:

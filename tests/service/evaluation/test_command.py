@@ -38,9 +38,21 @@ def test_a_plane_is_measured_and_written_as_json_alone(tmp_path: Path) -> None:
     assert planes["metrics"]["rank_correlation"] > 0.8
 
 
+@pytest.mark.parametrize("given", ["images", "features", "features+thumbnails"])
+def test_surfaces_are_the_default_and_hold_under_pose_noise(tmp_path: Path, given: str) -> None:
+    folder = str(recording.write(tmp_path / "plane", (0, 80, 160)))
+    (exact,) = run(folder, "--input", given)
+    assert exact["method"] == "auto"
+    (noisy,) = run(folder, "--method", "surface", "--input", given, "--pose-noise", "3,0.03")
+    assert exact["metrics"]["mae"] < 0.02
+    assert noisy["metrics"]["mae"] < 0.05
+    assert {pair["found_by"] for pair in exact["pairs"]} == {"image"}
+    assert all(pair["inliers"] > 50 for pair in exact["pairs"])
+
+
 def test_seeds_repeat_and_noise_is_told(tmp_path: Path) -> None:
     folder = str(recording.write(tmp_path / "plane"))
-    arguments = (folder, "--pose-noise", "3,0.03", "--seeds", "2", "--features", "orb", "--input", "features")
+    arguments = (folder, "--method", "frustum", "--pose-noise", "3,0.03", "--seeds", "2", "--features", "orb")
     first, again = run(*arguments), run(*arguments)
     assert [each["seed"] for each in first] == [0, 1]
     assert first[0]["pose_noise"] == [3, 0.03]
