@@ -29,7 +29,7 @@ class DepthOptions:
 
     inlier_px: float = 2.0
     neighbours: int = 8
-    agreeing: int = 4
+    agreeing: int = 3
     tolerance: float = 0.10
     sigmas: float = 2.0
     widened: float = 3.0
