@@ -72,17 +72,16 @@ def adjust(keyframes: Sequence[Sighted], links: Mapping[Pair, Link], options: Ad
     )
     prior = Prior(reported, np.where(free[:, None], loose, held), free)
     rotations = averaged_rotations(prior, links, options)
-    centres = unfold(keyframes_px(keyframes), rotations, reported.centres, links)
+    # A pair without a baseline has no direction to place anyone by.
+    ties = {pair: link for pair, link in links.items() if link.translation.any()}
+    centres = unfold(
+        [(keyframe.camera, keyframe.keypoints_px) for keyframe in keyframes], rotations, reported.centres, ties
+    )
     start = Poses(rotations, np.where(free[:, None], centres, reported.centres))
     found = bundle(start, prior, tracks(keyframes, links), options.bundle)
     return [
         Pose(found.rotations[k], found.centres[k]) if free[k] else keyframe.pose for k, keyframe in enumerate(keyframes)
     ]
-
-
-def keyframes_px(keyframes: Sequence[Sighted]) -> list[tuple[Camera, Floats]]:
-    """Cameras with their keypoints."""
-    return [(keyframe.camera, keyframe.keypoints_px) for keyframe in keyframes]
 
 
 def averaged_rotations(prior: Prior, links: Mapping[Pair, Link], options: AdjustmentOptions) -> Floats:

@@ -107,6 +107,17 @@ def test_robots_in_one_place_see_the_same() -> None:
     assert scene.overlap(0, 1) == (1.0, 1.0)
 
 
+def test_robots_in_one_place_do_not_spoil_the_adjustment_of_others() -> None:
+    first, second, third = views(points_on_wall(600), POSES[:3], noise_px=0.3)
+    turned = moved(third, Pose(third.pose.world_from_camera @ turn(0, 0.06, 0), third.pose.centre_m))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        scene = reconstruct([first, first, turned, second], ALL, OPTIONS)
+    assert scene.overlap(0, 1) == (1.0, 1.0)
+    right = reconstruct([first, third, second], [(0, 1), (0, 2), (1, 2)], OPTIONS).overlap(0, 1)
+    assert scene.overlap(0, 2) == pytest.approx(right, abs=0.03)
+
+
 def test_cameras_of_other_sizes_agree() -> None:
     half = Camera(np.diag([0.5, 0.5, 1.0]) @ CAMERA.matrix, CAMERA.width // 2, CAMERA.height // 2)
     large, small = views(FACING, POSES), views(FACING, POSES, camera=half)
