@@ -48,12 +48,16 @@ class Link:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sighted:
-    """A keyframe: camera, reported pose, keypoints (n, 2) in ideal px, and the median depth of what it sees, metres."""
+    """A keyframe: camera, reported pose, keypoints (n, 2) in ideal px, and the median depth of what it sees, metres.
+
+    One that is `held` stays where it is, whoever contradicts it.
+    """
 
     camera: Camera
     pose: Pose
     keypoints_px: Floats
     depth_m: float
+    held: bool = False
 
 
 def adjust(keyframes: Sequence[Sighted], links: Mapping[Pair, Link], options: AdjustmentOptions) -> list[Pose]:
@@ -62,6 +66,7 @@ def adjust(keyframes: Sequence[Sighted], links: Mapping[Pair, Link], options: Ad
     for pair, link in links.items():
         if link.contradicts:
             free[list(pair)] = True
+    free &= ~np.array([keyframe.held for keyframe in keyframes], np.bool_)
     if not free.any():
         return [keyframe.pose for keyframe in keyframes]
     reported = _poses([keyframe.pose for keyframe in keyframes])

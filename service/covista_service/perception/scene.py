@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,14 +13,13 @@ from scipy.sparse.csgraph import connected_components
 from covista_service.perception.adjustment import AdjustmentOptions, Link, Sighted, adjust
 from covista_service.perception.agreement import AgreementOptions, DepthPoints, Observations, agree
 from covista_service.perception.camera import Floats, Pose, View, relative, undistort
+from covista_service.perception.comparison import Comparison, ComparisonOptions, compare
 from covista_service.perception.depths import DepthOptions, Matched, observe
-from covista_service.perception.matching import MatchingOptions, match
-from covista_service.perception.relative_pose import RelativePoseOptions, relative_pose
-from covista_service.perception.sightings import Sightings
 from covista_service.perception.surface import Surface, SurfaceOptions, flat, interpolate
 from covista_service.perception.visibility import Seeing, VisibilityOptions, seen
 
 Pair = tuple[int, int]
+Motion = tuple[Floats, Floats]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +28,7 @@ class SceneOptions:
 
     seed: int = 0
     least_points: int = 3
-    matching: MatchingOptions = field(default_factory=lambda: MatchingOptions(rootsift_ratio=0.8))
-    pose: RelativePoseOptions = field(default_factory=RelativePoseOptions)
+    comparison: ComparisonOptions = field(default_factory=ComparisonOptions)
     adjustment: AdjustmentOptions = field(default_factory=AdjustmentOptions)
     depths: DepthOptions = field(default_factory=DepthOptions)
     agreement: AgreementOptions = field(default_factory=AgreementOptions)
@@ -39,18 +37,77 @@ class SceneOptions:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """What a pair of keyframes says: free `matches` (k, 2), the `link` if they verify it, and depths.
+
+    `observed` are the depths of either's keypoints under `motion` (R, t); None until poses are settled.
+    """
+
+    matches: NDArray[np.int64]
+    link: Link | None
+    motion: Motion | None = None
+    observed: tuple[Observations, Observations] | None = None
+
+    @classmethod
+    def of(cls, compared: Comparison) -> Evidence:
+        """What a comparison leaves to say, once poses are settled."""
+        return cls(compared.matches, compared.link)
+
+    @property
+    def matched(self) -> int:
+        """Matched points behind the depths."""
+        return 0 if self.observed is None else len(self.observed[0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sight:
+    """A keyframe among others: `view` with its reported pose, and the `pose` that stands.
+
+    One that is not `open` keeps its pose and its surface, and lends what it has. `beside` are depths of its keypoints
+    from keyframes that are not among the others, `former` the surface that it has, or one carried over from before.
+    """
+
+    view: View
+    pose: Pose
+    open: bool = True
+    beside: tuple[Observations, ...] = ()
+    former: Surface | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Settled:
+    """What a keyframe comes to: its pose, its surface if anything is known, and the points that it rests on.
+
+    Without points the surface is a former one, or flat at the depth that others see.
+    """
+
+    pose: Pose
+    surface: Surface | None
+    points: DepthPoints
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """`poses` as adjusted, `surfaces` (None where nothing is known), the matched points behind each pair's depths.
+    """`settled` keyframes, and the matched points behind each pair's depths.
 
     `parts` (n,): keyframes of one part are connected by matches, so that their depths have one scale.
     """
 
     views: tuple[View, ...]
-    poses: tuple[Pose, ...]
-    surfaces: tuple[Surface | None, ...]
+    settled: tuple[Settled, ...]
     matched: Mapping[Pair, int]
     parts: NDArray[np.int64]
     options: SceneOptions
+
+    @property
+    def poses(self) -> tuple[Pose, ...]:
+        """Poses as adjusted."""
+        return tuple(one.pose for one in self.settled)
+
+    @property
+    def surfaces(self) -> tuple[Surface | None, ...]:
+        """Surfaces, None where nothing is known."""
+        return tuple(one.surface for one in self.settled)
 
     def overlap(self, i: int, j: int) -> tuple[float, float] | None:
         """q_i and q_j of Eq. 16, None where a surface is missing."""
@@ -67,60 +124,54 @@ class Scene:
 
 
 def reconstruct(views: Sequence[View], pairs: Sequence[Pair], options: SceneOptions) -> Scene:
-    """Match all pairs, adjust the poses, and give every keyframe the surface that all its pairs agree on."""
-    ideal = [undistort(view.camera, view.features.keypoints_px) for view in views]
+    """Compare all pairs, and settle what that says of every keyframe."""
+    evidence = {(i, j): Evidence.of(compare(views[i], views[j], options.comparison)) for i, j in pairs}
+    settled, evidence = settle([Sight(view, view.pose) for view in views], evidence, options)
+    matched = {pair: said.matched for pair, said in evidence.items()}
+    return Scene(tuple(views), tuple(settled), matched, _parts(len(views), matched), options)
 
-    # What the images of each pair alone say: matches, and a pose where they contradict the reported one ...
-    free = {pair: _free(views, ideal, pair, options) for pair in pairs}
-    links = {pair: link for pair, (_, link) in free.items() if link is not None}
 
-    # ... is brought to one set of poses for all;
-    keyframes = [
-        Sighted(view.camera, view.pose, points, depth)
-        for view, points, depth in zip(views, ideal, _depths(views, ideal, links), strict=True)
-    ]
-    poses = adjust(keyframes, links, options.adjustment)
+def settle(
+    sights: Sequence[Sight], evidence: Mapping[Pair, Evidence], options: SceneOptions
+) -> tuple[list[Settled], dict[Pair, Evidence]]:
+    """What becomes of keyframes that pairs have news of, and the evidence with depths; indices are those of `sights`."""
+    ideal = [undistort(sight.view.camera, sight.view.features.keypoints_px) for sight in sights]
+
+    # Where the images of pairs contradict what was reported, poses are brought to agree with all of them;
+    poses = _adjusted(sights, ideal, evidence, options)
 
     # with those, each pair gives depths to both its keyframes,
-    observations: list[list[Observations]] = [[] for _ in views]
-    matched: dict[Pair, int] = {}
-    for (i, j), (matches, link) in free.items():
-        pair = Matched((views[i], views[j]), (ideal[i], ideal[j]), matches, link is not None)
-        of_first, of_second = observe(pair, *relative(poses[i], poses[j]), options.depths, options.seed)
-        matched[i, j] = len(of_first)
-        observations[i].append(of_first)
-        observations[j].append(of_second)
+    said = {pair: _observed(pair, one, sights, ideal, poses, options) for pair, one in evidence.items()}
 
     # and what all pairs of a keyframe agree on is its surface.
-    points = [
-        agree(said, points, view.camera.width, options.agreement)
-        for said, points, view in zip(observations, ideal, views, strict=True)
+    points = [_points(k, sight, ideal[k], said, options) for k, sight in enumerate(sights)]
+    surfaces = _surfaces(sights, points, said, options)
+    return [Settled(*one) for one in zip(poses, surfaces, points, strict=True)], said
+
+
+def _adjusted(
+    sights: Sequence[Sight], ideal: Sequence[Floats], evidence: Mapping[Pair, Evidence], options: SceneOptions
+) -> list[Pose]:
+    links = {pair: one.link for pair, one in evidence.items() if one.link is not None}
+    if not any(link.contradicts for link in links.values()):
+        return [sight.pose for sight in sights]
+    depths = _depths(sights, ideal, links)
+    keyframes = [
+        Sighted(sight.view.camera, sight.view.pose if sight.open else sight.pose, points, depth, held=not sight.open)
+        for sight, points, depth in zip(sights, ideal, depths, strict=True)
     ]
-    surfaces = _surfaces(views, points, pairs, options)
-    return Scene(tuple(views), tuple(poses), surfaces, matched, _parts(len(views), matched), options)
+    adjusted = adjust(keyframes, links, options.adjustment)
+    contradicted = {k for pair, link in links.items() if link.contradicts for k in pair}
+    return [
+        adjusted[k] if sight.open and k in contradicted else sight.pose for k, sight in enumerate(sights)
+    ]
 
 
-def _free(
-    views: Sequence[View], ideal: Sequence[Floats], pair: Pair, options: SceneOptions
-) -> tuple[NDArray[np.int64], Link | None]:
-    """Matches (k, 2) of a pair found without the geometry, and the link if they verify it."""
-    first, second = views[pair[0]], views[pair[1]]
-    if first.features.kind != second.features.kind:
-        return np.zeros((0, 2), np.int64), None
-    matches = match(first.features, second.features, options.matching).astype(np.int64)
-    sightings = Sightings(first.camera, second.camera, ideal[pair[0]][matches[:, 0]], ideal[pair[1]][matches[:, 1]])
-    pose = relative_pose(sightings, *relative(first.pose, second.pose), options.pose, options.seed)
-    if not pose.verified:
-        return matches, None
-    link = Link(matches[pose.inliers], pose.rotation, pose.translation, pose.source == "images")
-    return matches, link
-
-
-def _depths(views: Sequence[View], ideal: Sequence[Floats], links: Mapping[Pair, Link]) -> list[float]:
+def _depths(sights: Sequence[Sight], ideal: Sequence[Floats], links: Mapping[Pair, Link]) -> list[float]:
     """Median depth of what each keyframe sees by its links and reported baselines; that of all where it has none."""
-    found: list[list[Floats]] = [[] for _ in views]
+    found: list[list[Floats]] = [[] for _ in sights]
     for (i, j), link in links.items():
-        matched = Matched((views[i], views[j]), (ideal[i], ideal[j]), link.matches, True)
+        matched = Matched((sights[i].view, sights[j].view), (ideal[i], ideal[j]), link.matches, True)
         for index, said in zip((i, j), observe(matched, link.rotation, link.translation, None, 0), strict=True):
             found[index].append(1 / said.inverse_depths)
     medians = [float(np.median(np.concatenate(one))) if sum(map(len, one)) else np.nan for one in found]
@@ -129,21 +180,56 @@ def _depths(views: Sequence[View], ideal: Sequence[Floats], links: Mapping[Pair,
     return [depth if np.isfinite(depth) else usual for depth in medians]
 
 
+def _observed(
+    pair: Pair,
+    said: Evidence,
+    sights: Sequence[Sight],
+    ideal: Sequence[Floats],
+    poses: Sequence[Pose],
+    options: SceneOptions,
+) -> Evidence:
+    """The evidence with depths under the poses that stand now."""
+    i, j = pair
+    motion = relative(poses[i], poses[j])
+    if said.motion is not None and all(np.array_equal(*both) for both in zip(said.motion, motion, strict=True)):
+        return said
+    matched = Matched((sights[i].view, sights[j].view), (ideal[i], ideal[j]), said.matches, said.link is not None)
+    # What has been brought to agree contradicts no longer.
+    link = None if said.link is None else replace(said.link, contradicts=False)
+    return Evidence(said.matches, link, motion, observe(matched, *motion, options.depths, options.seed))
+
+
+def _points(
+    k: int, sight: Sight, ideal: Floats, evidence: Mapping[Pair, Evidence], options: SceneOptions
+) -> DepthPoints:
+    said = [one.observed[pair.index(k)] for pair, one in evidence.items() if k in pair and one.observed is not None]
+    if not sight.open:
+        said = []
+    return agree([*said, *sight.beside], ideal, sight.view.camera.width, options.agreement)
+
+
 def _surfaces(
-    views: Sequence[View], points: Sequence[DepthPoints], pairs: Sequence[Pair], options: SceneOptions
-) -> tuple[Surface | None, ...]:
-    """Own surfaces; without points, the median inverse depth of those that a keyframe is compared with."""
-    known = {
-        k: float(np.median(one.inverse_depths)) for k, one in enumerate(points) if len(one) >= options.least_points
-    }
+    sights: Sequence[Sight], points: Sequence[DepthPoints], pairs: Mapping[Pair, Evidence], options: SceneOptions
+) -> list[Surface | None]:
+    """Own surfaces; without points the former one, or the median inverse depth of those that it is compared with."""
+    known = {k: depth for k, sight in enumerate(sights) if (depth := _median(sight, points[k], options)) is not None}
     surfaces: list[Surface | None] = []
-    for k, (view, one) in enumerate(zip(views, points, strict=True)):
-        if k in known:
-            surfaces.append(interpolate(one, view.camera, options.surface, view.thumbnail))
-            continue
-        others = [known[other] for pair in pairs if k in pair for other in pair if other in known]
-        surfaces.append(flat(float(np.median(others))) if others else None)
-    return tuple(surfaces)
+    for k, (sight, own) in enumerate(zip(sights, points, strict=True)):
+        surface = sight.former
+        if sight.open and len(own) >= options.least_points:
+            surface = interpolate(own, sight.view.camera, options.surface, sight.view.thumbnail)
+        elif surface is None:
+            others = [known[other] for pair in pairs if k in pair for other in pair if other in known]
+            surface = flat(float(np.median(others))) if others else None
+        surfaces.append(surface)
+    return surfaces
+
+
+def _median(sight: Sight, points: DepthPoints, options: SceneOptions) -> float | None:
+    """Median inverse depth of what a keyframe sees."""
+    if len(points) >= options.least_points:
+        return float(np.median(points.inverse_depths))
+    return None if sight.former is None else float(np.median(sight.former.inverse_depth))
 
 
 def _parts(count: int, matched: Mapping[Pair, int]) -> NDArray[np.int64]:

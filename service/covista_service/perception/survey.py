@@ -8,13 +8,14 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from covista_service.perception.camera import Camera, Floats, View, relative, undistort
+from covista_service.perception.camera import Camera, Floats, View
+from covista_service.perception.comparison import Comparison, ComparisonOptions, compare
 from covista_service.perception.fuzzy import Points
-from covista_service.perception.matching import MatchingOptions, match
+from covista_service.perception.matching import MatchingOptions
 from covista_service.perception.overlap import CommonField, common_field, inverse_depths_second
 from covista_service.perception.planes import FoundPlanes, PlaneOptions, find_planes
 from covista_service.perception.polygon import corners
-from covista_service.perception.relative_pose import PoseSource, RelativePose, RelativePoseOptions, relative_pose
+from covista_service.perception.relative_pose import PoseSource, RelativePose
 from covista_service.perception.sightings import Sightings
 from covista_service.perception.territories import Marks, TerritoryOptions, territories
 from covista_service.perception.triangulation import Triangulation, TriangulationOptions, triangulate
@@ -71,8 +72,7 @@ class SurveyOptions:
 
     seed: int = 0
     min_matches: int = 8
-    matching: MatchingOptions = field(default_factory=MatchingOptions)
-    pose: RelativePoseOptions = field(default_factory=RelativePoseOptions)
+    comparison: ComparisonOptions = field(default_factory=lambda: ComparisonOptions(matching=MatchingOptions()))
     triangulation: TriangulationOptions = field(default_factory=TriangulationOptions)
     planes: PlaneOptions = field(default_factory=PlaneOptions)
     territories: TerritoryOptions = field(default_factory=TerritoryOptions)
@@ -83,17 +83,25 @@ def survey(first: View, second: View, options: SurveyOptions, prior: Survey | No
 
     A hopeless pair comes to an outcome with a name.
     """
-    if first.features.kind != second.features.kind:
+    compared = compare(first, second, options.comparison)
+    return explain(first.camera, second.camera, compared, options, prior)
+
+
+def explain(
+    first: Camera, second: Camera, compared: Comparison, options: SurveyOptions, prior: Survey | None = None
+) -> Survey:
+    """The same for a pair whose images have been compared."""
+    if not compared.comparable:
         return Survey(Outcome.KINDS_DIFFER)
 
     # "n matched feature points ..."
-    sightings = _sightings(first, second, options.matching)
+    sightings = compared.sightings
     matches = len(sightings.first_px)
     if matches < options.min_matches:
         return Survey(Outcome.FEW_MATCHES, matches=matches)
 
     # "... the orientation of both cameras is known, similarly the baseline": as reported, or better from the images.
-    pose = relative_pose(sightings, *relative(first.pose, second.pose), options.pose, options.seed)
+    pose = compared.pose
     found = _with_pose(pose, matches)
     if not pose.verified:
         return found
@@ -114,16 +122,9 @@ def survey(first: View, second: View, options: SurveyOptions, prior: Survey | No
     found = replace(found, plane_of_point=planes.labels)
 
     # "Projecting the visible region of one camera on the planes and then on the image plane of another camera."
-    orders = _orders(first.camera, second.camera, found, planes, options.territories)
-    common = common_field(first.camera, second.camera, pose.rotation, pose.translation, planes.normals, orders)
+    orders = _orders(first, second, found, planes, options.territories)
+    common = common_field(first, second, pose.rotation, pose.translation, planes.normals, orders)
     return _measured(found, planes, common)
-
-
-def _sightings(first: View, second: View, options: MatchingOptions) -> Sightings:
-    matches = match(first.features, second.features, options)
-    first_px = undistort(first.camera, first.features.keypoints_px[matches[:, 0]])
-    second_px = undistort(second.camera, second.features.keypoints_px[matches[:, 1]])
-    return Sightings(first.camera, second.camera, first_px, second_px)
 
 
 def _with_pose(pose: RelativePose, matches: int) -> Survey:

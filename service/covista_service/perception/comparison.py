@@ -1,0 +1,60 @@
+"""What the images of one pair alone say: which keypoints match, and the relative pose that the matches support."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from covista_service.perception.adjustment import Link
+from covista_service.perception.camera import View, relative, undistort
+from covista_service.perception.matching import MatchingOptions, match
+from covista_service.perception.relative_pose import RelativePose, RelativePoseOptions, relative_pose
+from covista_service.perception.sightings import Sightings
+
+
+@dataclass(frozen=True, slots=True)
+class ComparisonOptions:
+    """Options of both steps; `seed` of the sampling of poses."""
+
+    seed: int = 0
+    matching: MatchingOptions = field(default_factory=lambda: MatchingOptions(rootsift_ratio=0.8))
+    pose: RelativePoseOptions = field(default_factory=RelativePoseOptions)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Comparison:
+    """`matches` (k, 2) keypoint indices, the same points in ideal px, and the pose that they support.
+
+    `comparable`: whether the features are of one kind; none match otherwise.
+    """
+
+    comparable: bool
+    matches: NDArray[np.int64]
+    sightings: Sightings
+    pose: RelativePose
+
+    @property
+    def link(self) -> Link | None:
+        """What adjusting poses together needs of the pair, if its images verify it."""
+        if not self.pose.verified:
+            return None
+        contradicts = self.pose.source == "images"
+        return Link(self.matches[self.pose.inliers], self.pose.rotation, self.pose.translation, contradicts)
+
+
+def compare(first: View, second: View, options: ComparisonOptions) -> Comparison:
+    """Match two keyframes, and judge the relative pose that was reported."""
+    comparable = first.features.kind == second.features.kind
+    matches = np.zeros((0, 2), np.int64)
+    if comparable:
+        matches = match(first.features, second.features, options.matching).astype(np.int64)
+    sightings = Sightings(
+        first.camera,
+        second.camera,
+        undistort(first.camera, first.features.keypoints_px[matches[:, 0]]),
+        undistort(second.camera, second.features.keypoints_px[matches[:, 1]]),
+    )
+    reported = relative(first.pose, second.pose)
+    return Comparison(comparable, matches, sightings, relative_pose(sightings, *reported, options.pose, options.seed))

@@ -1,0 +1,38 @@
+"""A surface carried over into another view of the same scene, for a keyframe that has no points of its own yet."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from covista_service.perception.agreement import SINGLE, DepthPoints
+from covista_service.perception.camera import Camera, Floats
+from covista_service.perception.surface import Surface, SurfaceOptions, cell_centres, interpolate
+
+# Every third cell either way fixes a surface that is no finer than its cells.
+_STRIDE = 3
+_AHEAD = 1e-9
+# How far beyond the new image, in widths, a point still says something of the cells at its border.
+_BEYOND = 0.25
+
+
+def warped(
+    surface: Surface, camera: Camera, rotation: Floats, translation: Floats, to: Camera, options: SurfaceOptions
+) -> Surface | None:
+    """The surface as a second camera sees it, X_2 = R X_1 + t; None if none of it lies before that camera."""
+    grid = np.zeros(surface.inverse_depth.shape, np.bool_)
+    grid[_STRIDE // 2 :: _STRIDE, _STRIDE // 2 :: _STRIDE] = True
+    rho, sigma = surface.inverse_depth[grid], surface.sigma[grid]
+    pixels = cell_centres(camera)[grid.ravel()]
+    rays = np.column_stack((pixels, np.ones(len(pixels)))) @ camera.rays_from_pixels.T
+    # X / Z_1 for each point, so that far points need no division by what is nearly nothing.
+    there = rays @ rotation.T + rho[:, None] * translation
+    ahead = there[:, 2] > _AHEAD
+    there, rho, sigma = there[ahead], rho[ahead], sigma[ahead]
+    seen = (there / there[:, 2:]) @ to.matrix.T
+    margin = _BEYOND * to.width
+    near = (seen[:, :2] > -margin).all(axis=1) & (seen[:, 0] < to.width + margin) & (seen[:, 1] < to.height + margin)
+    if not near.any():
+        return None
+    depths = (rho / there[:, 2])[near]
+    confidences = np.full(len(depths), SINGLE)
+    return interpolate(DepthPoints(seen[near, :2], depths, sigma[near] * depths, confidences), to, options)
