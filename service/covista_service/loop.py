@@ -7,7 +7,7 @@ import itertools
 import logging
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
@@ -17,8 +17,10 @@ from covista_schemas.reports import EventReport
 
 from covista_service.answers import event_report
 from covista_service.perception.camera import Features
-from covista_service.perception.survey import Survey
+from covista_service.perception.comparison import Comparison
+from covista_service.perception.scene import Evidence, Settled
 from covista_service.station.events import (
+    BuildSurfaces,
     Effect,
     Event,
     ExtractFeatures,
@@ -29,6 +31,7 @@ from covista_service.station.events import (
     Keyframe,
     MessageDropped,
     MessagesReceived,
+    SurfacesBuilt,
     SurveyDone,
     SurveyPair,
     Tick,
@@ -43,6 +46,9 @@ BATCH = 32
 WORKER_FAILED = "worker_failed"
 _NS_PER_S = 1e9
 _T = TypeVar("_T")
+# Features of an image and its thumbnail as JPEG; settled keyframes and the evidence with depths.
+Extraction = tuple[Features, bytes | None]
+Built = tuple[tuple[Settled, ...], Mapping[tuple[int, int], Evidence]]
 
 log = logging.getLogger(__name__)
 
@@ -60,11 +66,14 @@ class Source(Protocol):
 class Crew(Protocol):
     """Who does the heavy work."""
 
-    def extract(self, keyframe: Keyframe) -> Future[Features]:
-        """Decode the keyframe's image and extract its features."""
+    def extract(self, keyframe: Keyframe) -> Future[Extraction]:
+        """Decode the keyframe's image and extract its features, and a thumbnail."""
 
-    def survey(self, job: SurveyPair) -> Future[Survey]:
+    def survey(self, job: SurveyPair) -> Future[Comparison]:
         """Survey a pair."""
+
+    def build(self, job: BuildSurfaces) -> Future[Built]:
+        """Settle poses and surfaces."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,7 +189,9 @@ class Loop:
                 self._telemetry.ended()
             case SurveyDone():
                 self._telemetry.ended()
-                self._telemetry.surveyed(event.survey.outcome if event.survey else WORKER_FAILED)
+                self._telemetry.surveyed(event.found.outcome if event.found else WORKER_FAILED)
+            case SurfacesBuilt():
+                self._telemetry.ended()
         try:
             effects = self._station.receive(event, self._clock())
         except Exception:
@@ -198,6 +209,8 @@ class Loop:
                 self._start(self._crew.extract(keyframe), lambda done: _extracted(keyframe, done))
             case SurveyPair():
                 self._start(self._crew.survey(effect), lambda done: _surveyed(effect, done))
+            case BuildSurfaces():
+                self._start(self._crew.build(effect), lambda done: _built(effect, done))
             case GroupsEvaluated(keyframes):
                 now_ns = self._clock()
                 for _, arrived_ns in keyframes:
@@ -225,17 +238,24 @@ class Loop:
             sink.take(news)
 
 
-def _extracted(keyframe: Keyframe, done: Future[Features]) -> FeaturesExtracted:
+def _extracted(keyframe: Keyframe, done: Future[Extraction]) -> FeaturesExtracted:
     match done.exception():
         case None:
-            return FeaturesExtracted(keyframe.id, done.result())
+            return FeaturesExtracted(keyframe.id, *done.result())
         case DecodeError() as error:
-            return FeaturesExtracted(keyframe.id, None, error.code, str(error))
+            return FeaturesExtracted(keyframe.id, None, None, error.code, str(error))
         case failure:
-            return FeaturesExtracted(keyframe.id, None, WORKER_FAILED, _describe("extracting features", failure))
+            return FeaturesExtracted(keyframe.id, None, None, WORKER_FAILED, _describe("extracting features", failure))
 
 
-def _surveyed(job: SurveyPair, done: Future[Survey]) -> SurveyDone:
+def _built(job: BuildSurfaces, done: Future[Built]) -> SurfacesBuilt:
+    failure = done.exception()
+    if failure is None:
+        return SurfacesBuilt(job, *done.result())
+    return SurfacesBuilt(job, None, problem=_describe("building surfaces", failure))
+
+
+def _surveyed(job: SurveyPair, done: Future[Comparison]) -> SurveyDone:
     failure = done.exception()
     if failure is None:
         return SurveyDone(job.first, job.second, done.result())

@@ -10,9 +10,9 @@ import logging
 import os
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from multiprocessing import get_context, parent_process
 from typing import Literal, ParamSpec, TypeVar
 
@@ -21,15 +21,18 @@ import numpy as np
 from covista_schemas import features as vision
 from covista_schemas.codec import BAD_IMAGE
 from covista_schemas.errors import DecodeError
+from numpy.typing import NDArray
 
 from covista_service.perception.camera import Features
-from covista_service.perception.survey import Survey, SurveyOptions, survey
-from covista_service.station.events import Keyframe, SurveyPair
+from covista_service.perception.comparison import Comparison, compare
+from covista_service.perception.scene import Evidence, SceneOptions, Settled, Sight, settle
+from covista_service.station.events import BuildSurfaces, Keyframe, SurveyPair
 
 # A robot that shot while tilted says so in its pose, not by an orientation tag in the file.
 _AS_STORED = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
+Built = tuple[tuple[Settled, ...], Mapping[tuple[int, int], Evidence]]
 
 log = logging.getLogger(__name__)
 
@@ -40,7 +43,7 @@ class WorkersOptions:
 
     kind: Literal["threads", "processes"] = "threads"
     count: int = 2
-    survey: SurveyOptions = field(default_factory=SurveyOptions)
+    scene: SceneOptions = field(default_factory=SceneOptions)
 
 
 class Workers:
@@ -59,15 +62,22 @@ class Workers:
         """How many jobs can run at a time."""
         return self._options.count
 
-    def extract(self, keyframe: Keyframe) -> Future[Features]:
-        """Decode the keyframe's image and extract its features; fails with DecodeError where it is no such image."""
+    def extract(self, keyframe: Keyframe) -> Future[tuple[Features, bytes | None]]:
+        """Decode the keyframe's image and extract its features and a thumbnail.
+
+        Fails with DecodeError where it is no such image.
+        """
         if keyframe.image is None:
             raise ValueError("a keyframe without an image has nothing to extract from")
         return self._submit(extract, keyframe.image, keyframe.camera.width, keyframe.camera.height)
 
-    def survey(self, job: SurveyPair) -> Future[Survey]:
+    def survey(self, job: SurveyPair) -> Future[Comparison]:
         """Survey a pair."""
-        return self._submit(survey, job.first_view, job.second_view, self._options.survey, job.prior)
+        return self._submit(compare, job.first_view, job.second_view, self._options.scene.comparison)
+
+    def build(self, job: BuildSurfaces) -> Future[Built]:
+        """Settle poses and surfaces."""
+        return self._submit(build, job.sights, job.thumbnails, job.evidence, self._options.scene)
 
     def close(self) -> None:
         """Let jobs under way end, and drop those that wait."""
@@ -89,8 +99,8 @@ class Workers:
                 return cancelled
 
 
-def extract(image: bytes, width: int, height: int) -> Features:
-    """The features of an encoded picture of this size. Raises DecodeError."""
+def extract(image: bytes, width: int, height: int) -> tuple[Features, bytes | None]:
+    """The features of an encoded picture of this size, and its thumbnail. Raises DecodeError."""
     try:
         picture = cv2.imdecode(np.frombuffer(image, np.uint8), _AS_STORED)
     except cv2.error as error:
@@ -102,7 +112,32 @@ def extract(image: bytes, width: int, height: int) -> Features:
             BAD_IMAGE, "image", f"{picture.shape[1]} x {picture.shape[0]} px, but the camera says {width} x {height}"
         )
     found = vision.extract(np.asarray(picture, np.uint8))
-    return Features(found.kind.value, found.keypoints_px, found.descriptors)
+    thumbnail = vision.thumbnail(np.asarray(picture, np.uint8))
+    return Features(found.kind.value, found.keypoints_px, found.descriptors), thumbnail
+
+
+def build(
+    sights: Sequence[Sight],
+    thumbnails: Sequence[bytes | None],
+    evidence: Mapping[tuple[int, int], Evidence],
+    options: SceneOptions,
+) -> Built:
+    """Settle poses and surfaces of sights with their encoded thumbnails."""
+    seen = [
+        replace(sight, view=replace(sight.view, thumbnail=_grey(data))) if data else sight
+        for sight, data in zip(sights, thumbnails, strict=True)
+    ]
+    settled, said = settle(seen, evidence, options)
+    return tuple(settled), said
+
+
+def _grey(data: bytes) -> NDArray[np.uint8] | None:
+    """A thumbnail's picture (h, w); None if it is none, for a surface does without."""
+    try:
+        picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
+    except cv2.error:
+        return None
+    return None if picture is None else np.asarray(picture, np.uint8)
 
 
 def _pool(options: WorkersOptions) -> Executor:

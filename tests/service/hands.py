@@ -3,9 +3,11 @@
 from collections.abc import Callable
 from concurrent.futures import Future
 
-from covista_service.perception.camera import Features
-from covista_service.perception.survey import Survey, SurveyOptions, survey
-from covista_service.station.events import Keyframe, SurveyPair
+from covista_service.loop import Built, Extraction
+from covista_service.perception.comparison import Comparison, ComparisonOptions, compare
+from covista_service.perception.scene import SceneOptions
+from covista_service.station.events import BuildSurfaces, Keyframe, SurveyPair
+from covista_service.workers import build
 
 from tests.service.station.scenes import FEATURES
 
@@ -16,11 +18,14 @@ class Hands:
     def __init__(self) -> None:
         self.failure: Exception | None = None
 
-    def extract(self, keyframe: Keyframe) -> Future[Features]:
-        return self._done(lambda: FEATURES)
+    def extract(self, keyframe: Keyframe) -> Future[Extraction]:
+        return self._done(lambda: (FEATURES, None))
 
-    def survey(self, job: SurveyPair) -> Future[Survey]:
-        return self._done(lambda: survey(job.first_view, job.second_view, SurveyOptions(), job.prior))
+    def survey(self, job: SurveyPair) -> Future[Comparison]:
+        return self._done(lambda: compare(job.first_view, job.second_view, ComparisonOptions()))
+
+    def build(self, job: BuildSurfaces) -> Future[Built]:
+        return self._done(lambda: build(job.sights, job.thumbnails, job.evidence, SceneOptions()))
 
     def _done(self, work: Callable[[], object]) -> Future:
         future: Future = Future()

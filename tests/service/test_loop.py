@@ -110,7 +110,7 @@ def test_a_failed_survey_is_counted_and_survived() -> None:
     desk.put(keyframe_bytes("r2", 1.0), "r2")
     desk.settle()
     assert desk.telemetry.summary().outcomes == {WORKER_FAILED: 1}
-    assert desk.loop.snapshot().pair("r1", "r2").survey is None
+    assert desk.loop.snapshot().pair("r1", "r2").compared is None
 
 
 def test_a_bug_that_one_event_brings_to_light_does_not_stop_the_others(

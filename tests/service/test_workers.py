@@ -15,8 +15,10 @@ from covista_schemas.errors import DecodeError
 from covista_service.link.mailbox import Letter, Mailboxes
 from covista_service.link.translate import events_of
 from covista_service.perception.camera import View
-from covista_service.perception.survey import Outcome
-from covista_service.station.events import Keyframe, KeyframeArrived, SurveyPair
+from covista_service.perception.comparison import Outcome
+from covista_service.perception.scene import Evidence, Sight
+from covista_service.station.events import BuildSurfaces, Keyframe, KeyframeArrived, KeyframeId, SurveyPair
+from covista_service.station.outlooks import Outlook, masks
 from covista_service.workers import Workers, WorkersOptions, extract
 
 from tests.service.deadline import wait_until
@@ -32,6 +34,10 @@ def arrived(data: bytes, robot: str) -> Keyframe:
     return event.keyframe
 
 
+def keyframe(name: KeyframeId) -> Keyframe:
+    return arrived(keyframe_bytes(name.robot), name.robot)
+
+
 def pair(distance_m: float = 1.0) -> SurveyPair:
     first, second = arrived(keyframe_bytes("r1"), "r1"), arrived(keyframe_bytes("r2", distance_m), "r2")
     assert first.features is not None
@@ -41,7 +47,6 @@ def pair(distance_m: float = 1.0) -> SurveyPair:
         second.id,
         View(first.camera, first.pose, first.features),
         View(second.camera, second.pose, second.features),
-        None,
     )
 
 
@@ -53,15 +58,30 @@ def workers(request: pytest.FixtureRequest) -> Iterator[Workers]:
 
 
 def test_pictures_become_features(workers: Workers) -> None:
-    found = workers.extract(arrived(picture_bytes("r1"), "r1")).result(30)
+    found, thumbnail = workers.extract(arrived(picture_bytes("r1"), "r1")).result(30)
     assert found.kind == "rootsift"
+    assert thumbnail is not None
+    assert features.decode_image(thumbnail).shape == (72, 96, 3)
     assert len(found.keypoints_px) == len(found.descriptors) > 50
 
 
 def test_pairs_are_surveyed(workers: Workers) -> None:
     found = workers.survey(pair()).result(30)
     assert found.outcome is Outcome.MEASURED
-    assert found.overlap_first == pytest.approx(overlap(1.0), abs=0.05)
+    assert len(found.matches) > 50
+
+
+@pytest.mark.parametrize("thumbnail", [None, features.thumbnail(picture()), b"no picture"])
+def test_surfaces_are_built(workers: Workers, thumbnail: bytes | None) -> None:
+    """A thumbnail that is none does no harm."""
+    job = pair()
+    found = workers.survey(job).result(30)
+    sights = (Sight(job.first_view, job.first_view.pose), Sight(job.second_view, job.second_view.pose))
+    names, evidence = (job.first, job.second), {(0, 1): Evidence.of(found)}
+    settled, said = workers.build(BuildSurfaces(names, sights, (thumbnail, None), evidence)).result(30)
+    assert said[0, 1].matched > 50
+    one, other = (Outlook(keyframe(name), each.pose, each.surface, 50, {}) for name, each in zip(names, settled))
+    assert masks(one, other, connected=True)[0].mean() == pytest.approx(overlap(1.0), abs=0.05)
 
 
 def test_what_is_wrong_with_a_picture_comes_back(workers: Workers) -> None:
@@ -81,7 +101,7 @@ def test_a_picture_that_decodes_to_another_size_is_refused() -> None:
 
 def test_grey_pictures_do_as_well() -> None:
     grey = np.ascontiguousarray(picture()[..., 1])
-    assert len(extract(features.encode_jpeg(grey), 320, 240).keypoints_px) > 50
+    assert len(extract(features.encode_jpeg(grey), 320, 240)[0].keypoints_px) > 50
 
 
 def test_a_keyframe_without_a_picture_is_a_mistake_of_ours(workers: Workers) -> None:

@@ -7,12 +7,13 @@ from covista_service.answers.grouping import (
     own_group_report,
     similarity_report,
 )
-from covista_service.answers.pairs import explaining_survey, find_pair, pair_report, pairs_report
+from covista_service.answers.pairs import common_regions, explaining_survey, find_pair, pair_report, pairs_report
 from covista_service.answers.robots import find_robot, robot_report, robots_report
 from covista_service.answers.unknown import NotKnownError, problem_of
 
 __all__ = [
     "NotKnownError",
+    "common_regions",
     "event_report",
     "explaining_survey",
     "find_pair",

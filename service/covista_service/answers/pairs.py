@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -9,9 +10,12 @@ from covista_schemas import reports
 
 from covista_service.answers.robots import find_robot, keyframe_id
 from covista_service.answers.unknown import NotKnownError
-from covista_service.perception.camera import Floats, Pose
-from covista_service.perception.survey import Outcome, Plane, Survey
+from covista_service.perception.camera import Camera, Floats, Pose
+from covista_service.perception.comparison import Comparison
+from covista_service.perception.regions import polygons
+from covista_service.perception.survey import Outcome, Plane, Survey, SurveyOptions, explain
 from covista_service.station.events import Keyframe
+from covista_service.station.outlooks import masks
 from covista_service.station.snapshot import PairView, Snapshot
 
 # Hundredths of a pixel are finer than any camera's model.
@@ -43,24 +47,42 @@ def pair_report(snapshot: Snapshot, a: str, b: str) -> reports.PairReport:
     """A pair in the order asked for. Raises NotKnownError."""
     view = find_pair(snapshot, a, b)
     first: Literal["a", "b"] = "a" if view.a == a else "b"
-    planes = _planes(view)
+    planes, regions = _planes(view), common_regions(view)
     if first == "b":
         planes = [
             plane.model_copy(update={"polygon_a": plane.polygon_b, "polygon_b": plane.polygon_a}) for plane in planes
         ]
+        regions = regions[::-1]
     return reports.PairReport(
         **_pair(view, first),
-        regions_a=[plane.polygon_a for plane in planes if plane.polygon_a],
-        regions_b=[plane.polygon_b for plane in planes if plane.polygon_b],
+        regions_a=[_polygon(region) for region in regions[0]],
+        regions_b=[_polygon(region) for region in regions[1]],
         planes=planes,
     )
 
 
 def explaining_survey(view: PairView) -> Survey | None:
-    """The survey that a pair's overlaps were read from, if they were."""
-    if view.survey is None or view.survey.outcome is not Outcome.MEASURED or view.keyframe_a is None:
+    """The planes of a pair, as far as images of the keyframes that its overlaps were read from tell them."""
+    if not view.explained or view.compared is None or view.keyframe_a is None or view.keyframe_b is None:
         return None
-    return view.survey
+    found = _explained(view.keyframe_a.camera, view.keyframe_b.camera, view.compared)
+    return found if found.outcome is Outcome.MEASURED else None
+
+
+@lru_cache(maxsize=64)
+def _explained(first: Camera, second: Camera, compared: Comparison) -> Survey:
+    """Clustering planes takes some milliseconds: done when somebody asks, and kept for who asks again."""
+    return explain(first, second, compared, SurveyOptions())
+
+
+def common_regions(view: PairView) -> tuple[list[Floats], list[Floats]]:
+    """The common field in a's image and in b's: polygons (k, 2) in px, by the surfaces that the overlaps come from."""
+    if view.outlooks is None:
+        return [], []
+    seen = masks(*view.outlooks, connected=view.connected)
+    cameras = [outlook.keyframe.camera for outlook in view.outlooks]
+    in_a, in_b = (polygons(mask, camera) for mask, camera in zip(seen, cameras, strict=True))
+    return in_a, in_b
 
 
 def _pair(view: PairView, first: Literal["a", "b"]) -> dict[str, object]:
@@ -84,8 +106,8 @@ def _pair(view: PairView, first: Literal["a", "b"]) -> dict[str, object]:
 def _pose_source(view: PairView) -> Literal["reported", "images"] | None:
     if view.found_by is reports.FoundBy.UNKNOWN:
         return None
-    survey = explaining_survey(view)
-    return "reported" if survey is None else survey.pose_source
+    corrected = view.outlooks is not None and any(one.pose is not one.keyframe.pose for one in view.outlooks)
+    return "images" if corrected else "reported"
 
 
 def _keyframes(a: Keyframe | None, b: Keyframe | None) -> reports.PairKeyframes | None:

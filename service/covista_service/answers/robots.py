@@ -7,6 +7,7 @@ from covista_schemas import messages, reports
 
 from covista_service.answers.unknown import NotKnownError
 from covista_service.perception.camera import Camera, Floats
+from covista_service.station.corrections import Correction
 from covista_service.station.events import KeyframeId
 from covista_service.station.ledger import Counts
 from covista_service.station.roster import Fix
@@ -43,7 +44,7 @@ def _robot(view: RobotView) -> reports.RobotReport:
         heard=keyframe_id(view.announced) if view.announced else None,
         last_seen=None if view.last_seen_ns is None else reports.time_of(view.last_seen_ns),
         clock_offset_s=view.clock_offset_s,
-        pose_correction=None,
+        pose_correction=_correction(view.correction) if view.correction else None,
         keyframes=_counters(view.keyframes),
         poses=_counters(view.poses),
         last_problem=view.last_problem,
@@ -90,6 +91,10 @@ def camera_message(camera: Camera) -> messages.Camera:
 def keyframe_id(keyframe: KeyframeId) -> reports.KeyframeId:
     """The keyframe's name."""
     return reports.KeyframeId(boot=keyframe.boot, sequence=keyframe.sequence)
+
+
+def _correction(correction: Correction) -> reports.PoseCorrection:
+    return reports.PoseCorrection(deg=correction.deg, m=correction.m)
 
 
 def _counters(counts: Counts) -> reports.Counters:

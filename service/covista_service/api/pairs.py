@@ -59,10 +59,12 @@ def _draw(view: PairView, drawn: str, other: str) -> bytes:
 
 
 def _common_field(view: PairView, *, first: bool) -> CommonField | None:
+    regions = tuple(answers.common_regions(view)[0 if first else 1])
     survey = answers.explaining_survey(view)
     if survey is None:
-        return None
+        return CommonField(regions) if view.outlooks is not None else None
     return CommonField(
+        regions,
         tuple(plane.region_first if first else plane.region_second for plane in survey.planes),
         survey.points_first_px if first else survey.points_second_px,
         tuple(survey.plane_of_point.tolist()),

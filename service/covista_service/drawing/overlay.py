@@ -1,6 +1,6 @@
 """The common field of view drawn in a keyframe, as the paper's Figs. 2 to 4 show it.
 
-What the other camera does not see is dimmed, planes are tinted, matched points are yellow.
+What the other camera does not see is dimmed, planes are tinted where they are common, matched points are yellow.
 """
 
 from __future__ import annotations
@@ -26,8 +26,13 @@ _NEUTRAL = 96
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CommonField:
-    """What a survey found, in ideal pixels of one image: a polygon (k, 2) per plane, points (n, 2), plane of each."""
+    """What is known of the common field, in ideal pixels of one image.
 
+    `regions_px`: polygons (k, 2) whose insides, by the even-odd rule, the other camera sees. `polygons_px`: one (k, 2)
+    for each plane that explains them, with points (n, 2) and the plane of each. Without regions the planes are all.
+    """
+
+    regions_px: tuple[Floats, ...] = ()
     polygons_px: tuple[Floats, ...] = ()
     points_px: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     plane_of_point: tuple[int, ...] = ()
@@ -89,13 +94,18 @@ def _undistorted(picture: Picture, camera: Camera, scale: float) -> Picture:
 
 def _draw(ground: Picture, common: CommonField, scale: float) -> Picture:
     polygons_px = [_scaled(polygon, scale) for polygon in common.polygons_px]
-    seen = canvas.mask_of(ground.shape[:2], polygons_px).astype(np.float32)[..., None] / 255.0
+    regions_px = [_scaled(region, scale) for region in common.regions_px]
+    seen = canvas.mask_of(ground.shape[:2], regions_px or polygons_px).astype(np.float32)[..., None] / 255.0
     grey = cv2.cvtColor(cv2.cvtColor(ground, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
     drawn: Picture = np.rint(ground * seen + grey * (_DIMMED * (1.0 - seen))).astype(np.uint8)
+    tinted = drawn.copy()
     for index, polygon_px in enumerate(polygons_px):
         if len(polygon_px) >= 3:
-            canvas.fill(drawn, polygon_px, canvas.palette(index), 0.22)
-            canvas.line(drawn, polygon_px, canvas.palette(index), 2, closed=True)
+            canvas.fill(tinted, polygon_px, canvas.palette(index), 0.22)
+            canvas.line(tinted, polygon_px, canvas.palette(index), 2, closed=True)
+    drawn = np.rint(tinted * seen + drawn * (1.0 - seen)).astype(np.uint8)
+    for region_px in regions_px:
+        canvas.line(drawn, region_px, canvas.PAPER, 1, closed=True)
     for point_px, plane in zip(_scaled(common.points_px, scale), common.plane_of_point, strict=True):
         canvas.dot(drawn, point_px, 2.0, canvas.YELLOW if plane >= 0 else canvas.GREY)
     return drawn

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +15,23 @@ from covista_service.perception.relative_pose import RelativePose, RelativePoseO
 from covista_service.perception.sightings import Sightings
 
 
+class Outcome(StrEnum):
+    """What comparing the images of a pair, or a survey of its planes, came to. Only `measured` carries an overlap."""
+
+    MEASURED = "measured"
+    FEW_MATCHES = "few_matches"
+    UNVERIFIED = "unverified"
+    NO_PARALLAX = "no_parallax"
+    NO_PLANE = "no_plane"
+    KINDS_DIFFER = "kinds_differ"
+
+
 @dataclass(frozen=True, slots=True)
 class ComparisonOptions:
-    """Options of both steps; `seed` of the sampling of poses."""
+    """Options of both steps; `seed` of the sampling of poses. `min_matches`: with fewer, nothing can be verified."""
 
     seed: int = 0
+    min_matches: int = 8
     matching: MatchingOptions = field(default_factory=lambda: MatchingOptions(rootsift_ratio=0.8))
     pose: RelativePoseOptions = field(default_factory=RelativePoseOptions)
 
@@ -27,13 +40,24 @@ class ComparisonOptions:
 class Comparison:
     """`matches` (k, 2) keypoint indices, the same points in ideal px, and the pose that they support.
 
-    `comparable`: whether the features are of one kind; none match otherwise.
+    `comparable`: whether the features are of one kind; none match otherwise. `enough`: whether so many match that they
+    can verify a pose.
     """
 
     comparable: bool
     matches: NDArray[np.int64]
     sightings: Sightings
     pose: RelativePose
+    enough: bool = True
+
+    @property
+    def outcome(self) -> Outcome:
+        """`measured` if images verify the pair: depths, and so an overlap, can be told from them."""
+        if not self.comparable:
+            return Outcome.KINDS_DIFFER
+        if not self.enough:
+            return Outcome.FEW_MATCHES
+        return Outcome.MEASURED if self.pose.verified else Outcome.UNVERIFIED
 
     @property
     def link(self) -> Link | None:
@@ -57,4 +81,5 @@ def compare(first: View, second: View, options: ComparisonOptions) -> Comparison
         undistort(second.camera, second.features.keypoints_px[matches[:, 1]]),
     )
     reported = relative(first.pose, second.pose)
-    return Comparison(comparable, matches, sightings, relative_pose(sightings, *reported, options.pose, options.seed))
+    pose = relative_pose(sightings, *reported, options.pose, options.seed)
+    return Comparison(comparable, matches, sightings, pose, len(matches) >= options.min_matches)

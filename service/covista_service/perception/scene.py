@@ -134,7 +134,7 @@ def reconstruct(views: Sequence[View], pairs: Sequence[Pair], options: SceneOpti
 def settle(
     sights: Sequence[Sight], evidence: Mapping[Pair, Evidence], options: SceneOptions
 ) -> tuple[list[Settled], dict[Pair, Evidence]]:
-    """What becomes of keyframes that pairs have news of, and the evidence with depths; indices are those of `sights`."""
+    """What becomes of keyframes that pairs have news of, and the evidence with depths, by index of `sights`."""
     ideal = [undistort(sight.view.camera, sight.view.features.keypoints_px) for sight in sights]
 
     # Where the images of pairs contradict what was reported, poses are brought to agree with all of them;
@@ -162,9 +162,7 @@ def _adjusted(
     ]
     adjusted = adjust(keyframes, links, options.adjustment)
     contradicted = {k for pair, link in links.items() if link.contradicts for k in pair}
-    return [
-        adjusted[k] if sight.open and k in contradicted else sight.pose for k, sight in enumerate(sights)
-    ]
+    return [adjusted[k] if sight.open and k in contradicted else sight.pose for k, sight in enumerate(sights)]
 
 
 def _depths(sights: Sequence[Sight], ideal: Sequence[Floats], links: Mapping[Pair, Link]) -> list[float]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from covista_service.perception.camera import Camera, Floats, View
 from covista_service.perception.comparison import Comparison, ComparisonOptions, compare
+from covista_service.perception.comparison import Outcome as Outcome
 from covista_service.perception.fuzzy import Points
 from covista_service.perception.matching import MatchingOptions
 from covista_service.perception.overlap import CommonField, common_field, inverse_depths_second
@@ -19,17 +19,6 @@ from covista_service.perception.relative_pose import PoseSource, RelativePose
 from covista_service.perception.sightings import Sightings
 from covista_service.perception.territories import Marks, TerritoryOptions, territories
 from covista_service.perception.triangulation import Triangulation, TriangulationOptions, triangulate
-
-
-class Outcome(StrEnum):
-    """What a survey came to. Only `measured` carries an overlap."""
-
-    MEASURED = "measured"
-    FEW_MATCHES = "few_matches"
-    UNVERIFIED = "unverified"
-    NO_PARALLAX = "no_parallax"
-    NO_PLANE = "no_plane"
-    KINDS_DIFFER = "kinds_differ"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,10 +57,9 @@ class Survey:
 
 @dataclass(frozen=True, slots=True)
 class SurveyOptions:
-    """Options of all stages. `min_matches`: with fewer, nothing can be verified."""
+    """Options of all stages; `seed` of the clustering."""
 
     seed: int = 0
-    min_matches: int = 8
     comparison: ComparisonOptions = field(default_factory=lambda: ComparisonOptions(matching=MatchingOptions()))
     triangulation: TriangulationOptions = field(default_factory=TriangulationOptions)
     planes: PlaneOptions = field(default_factory=PlaneOptions)
@@ -97,7 +85,7 @@ def explain(
     # "n matched feature points ..."
     sightings = compared.sightings
     matches = len(sightings.first_px)
-    if matches < options.min_matches:
+    if not compared.enough:
         return Survey(Outcome.FEW_MATCHES, matches=matches)
 
     # "... the orientation of both cameras is known, similarly the baseline": as reported, or better from the images.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator
+from collections.abc import Set as AbstractSet
 from heapq import heappop, heappush
 from itertools import combinations
 
@@ -14,13 +15,15 @@ from covista_service.station.roster import Roster
 
 _SWEEP_STEP = 64
 _SWEEP_EVERY = 8
+_MOTION_EVERY = 4
 
 
 class Agenda:
-    """Pairs in three queues, taken in turns so that none can starve another.
+    """Pairs in four queues, taken in turns so that none can starve another.
 
     *Fresh*: keyframes that no survey has seen yet, in order of arrival, each with its most promising partner.
     *Regular*: pairs whose views may meet and that have a new keyframe, the one tried longest ago first.
+    *Moved*: a robot's new keyframe and an earlier one of its own, whose parallax tells depths.
     *Sweep*: all other pairs with a new keyframe, a few at a time, each tried once in a while.
     """
 
@@ -33,6 +36,7 @@ class Agenda:
         self._partners: defaultdict[str, set[str]] = defaultdict(set)
         self._tried_ns: dict[Pair, int] = {}
         self._fresh: dict[str, None] = {}
+        self._moved: dict[str, Keyframe] = {}
         self._regular: list[tuple[int, Pair]] = []
         self._queued: set[Pair] = set()
         self._sweep: Iterator[Pair] = iter(())
@@ -53,6 +57,21 @@ class Agenda:
         """A robot has a keyframe that no survey has seen; one that waits already keeps its place."""
         self._fresh.setdefault(robot)
 
+    def moved(self, robot: str, earlier: Keyframe | None) -> None:
+        """Hold a robot's new keyframe against an earlier one of its own; None if that would tell nothing."""
+        self._moved.pop(robot, None)
+        if earlier is not None:
+            self._moved[robot] = earlier
+
+    def partners(self, robot: str) -> AbstractSet[str]:
+        """Robots whose views may meet this one's."""
+        return self._partners.get(robot, frozenset())
+
+    @property
+    def under_way_count(self) -> int:
+        """How many surveys are under way."""
+        return len(self._in_flight)
+
     def start(self, now_ns: int) -> tuple[Keyframe, Keyframe] | None:
         """The next pair of keyframes to survey, under way from now on; None if nothing is due or all hands are full."""
         if len(self._in_flight) >= self._capacity:
@@ -61,6 +80,7 @@ class Agenda:
         if self._starts % 2:
             queues.reverse()
         queues.insert(0 if self._starts % _SWEEP_EVERY == _SWEEP_EVERY - 1 else 2, lambda: self._next_swept(now_ns))
+        queues.insert(0 if self._starts % _MOTION_EVERY == _MOTION_EVERY - 1 else 2, self._next_moved)
         pair = next((found for queue in queues if (found := queue()) is not None), None)
         return None if pair is None else self._start(pair, now_ns)
 
@@ -86,6 +106,7 @@ class Agenda:
         for partner in self._partners.pop(robot, set()):
             self._partners[partner].discard(robot)
         self._fresh.pop(robot, None)
+        self._moved.pop(robot, None)
         for pair in [pair for pair in self._tried_ns if robot in pair]:
             del self._tried_ns[pair]
         for pair in [pair for pair in self._in_flight if robot in pair]:
@@ -96,8 +117,11 @@ class Agenda:
         # Every queue offers pairs that are due, and those have both keyframes.
         assert keyframes is not None  # noqa: S101 - tells the type checker what `_due` has found
         self._in_flight[pair] = keyframes
-        self._tried_ns[pair] = now_ns
         self._starts += 1
+        if pair[0] == pair[1]:
+            del self._moved[pair[0]]
+            return keyframes
+        self._tried_ns[pair] = now_ns
         for robot in pair:
             self._fresh.pop(robot, None)
         return keyframes
@@ -106,6 +130,9 @@ class Agenda:
         first, second = self._roster.get(pair[0]), self._roster.get(pair[1])
         if first is None or second is None or first.keyframe is None or second.keyframe is None:
             return None
+        if first is second:
+            earlier = self._moved.get(pair[0])
+            return None if earlier is None else (earlier, first.keyframe)
         return first.keyframe, second.keyframe
 
     def _due(self, pair: Pair) -> bool:
@@ -127,6 +154,9 @@ class Agenda:
             if not self._partners[robot]:
                 del self._fresh[robot]
         return None
+
+    def _next_moved(self) -> Pair | None:
+        return next(((robot, robot) for robot in self._moved if (robot, robot) not in self._in_flight), None)
 
     def _promise(self, pair: Pair) -> tuple[float, int, Pair]:
         overlaps = self._pairs.overlaps(pair)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
 from covista_schemas.reports import EventKind
 
 from covista_service.perception.camera import Camera, Features, Pose, View
-from covista_service.perception.survey import Survey
+from covista_service.perception.comparison import Comparison
+from covista_service.perception.scene import Evidence, Settled, Sight
 
 Topic = Literal["keyframe", "pose"]
 Pair = tuple[str, str]
@@ -25,7 +27,10 @@ class KeyframeId:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Keyframe:
-    """A keyframe inside the station; `features` is None until they are extracted from `image` (encoded bytes)."""
+    """A keyframe inside the station; `features` is None until they are extracted from `image` (encoded bytes).
+
+    `thumbnail` is a small grey JPEG of it, if there is one.
+    """
 
     id: KeyframeId
     time_ns: int
@@ -110,17 +115,28 @@ class FeaturesExtracted:
 
     keyframe: KeyframeId
     features: Features | None
+    thumbnail: bytes | None = None
     code: str = ""
     problem: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class SurveyDone:
-    """A worker has surveyed a pair, or failed to (`survey` None, `problem` says why)."""
+    """A worker has surveyed a pair, or failed to (`found` None, `problem` says why)."""
 
     first: KeyframeId
     second: KeyframeId
-    survey: Survey | None
+    found: Comparison | None
+    problem: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SurfacesBuilt:
+    """A worker has built the surfaces of `job`, in the order of its sights, or failed to (`settled` None)."""
+
+    job: BuildSurfaces
+    settled: tuple[Settled, ...] | None
+    evidence: Mapping[tuple[int, int], Evidence] = field(default_factory=dict)
     problem: str = ""
 
 
@@ -138,6 +154,7 @@ Event = (
     | TokenLost
     | FeaturesExtracted
     | SurveyDone
+    | SurfacesBuilt
     | Tick
 )
 
@@ -154,13 +171,28 @@ class ExtractFeatures:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurveyPair:
-    """Survey this pair of keyframes, starting from the pair's last result; the answer is SurveyDone."""
+    """Survey this pair of keyframes: compare their images. The answer is SurveyDone.
+
+    Both may be one robot's: an earlier and a new one, for the parallax of its own motion.
+    """
 
     first: KeyframeId
     second: KeyframeId
     first_view: View
     second_view: View
-    prior: Survey | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BuildSurfaces:
+    """Settle poses and surfaces of the open ones among these keyframes; the answer is SurfacesBuilt.
+
+    `keyframes`, `sights` and `thumbnails` (encoded, or None) go together; `evidence` is by their indices.
+    """
+
+    keyframes: tuple[KeyframeId, ...]
+    sights: tuple[Sight, ...]
+    thumbnails: tuple[bytes | None, ...]
+    evidence: Mapping[tuple[int, int], Evidence]
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,4 +223,4 @@ class Happened:
     revision_after: int | None = None
 
 
-Effect = ExtractFeatures | SurveyPair | GroupsEvaluated | GroupsChanged | Happened
+Effect = ExtractFeatures | SurveyPair | BuildSurfaces | GroupsEvaluated | GroupsChanged | Happened

@@ -7,34 +7,42 @@ from dataclasses import dataclass, replace
 
 from covista_schemas.reports import FoundBy
 
-from covista_service.perception.survey import Outcome, Survey
+from covista_service.perception.comparison import Comparison
 from covista_service.station.events import Keyframe, KeyframeId, Pair
+from covista_service.station.outlooks import Outlook
 
 NOT_SURVEYED = "not_surveyed"
 FAILED = "failed"
-# Images that were compared, and did not match, speak against what poses and depths predict.
-_UNMATCHED = (Outcome.FEW_MATCHES, Outcome.UNVERIFIED)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answer:
-    """The overlap of a pair as last found, on which keyframes: `overlaps` are the shares of first's and second's."""
+    """The overlap of a pair as last found, on which keyframes: `overlaps` are the shares of first's and second's.
+
+    `outlooks` are what it was read from; None if their views cannot meet. `connected`: by matches, if by way of others.
+    """
 
     overlaps: tuple[float, float]
     found_by: FoundBy
     computed_ns: int
     first: Keyframe
     second: Keyframe
+    outlooks: tuple[Outlook, Outlook] | None = None
+    connected: bool = True
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairRecord:
-    """One pair: the answer in force, the last survey, what it came to, and the keyframes it was made on."""
+    """One pair: the answer in force, the last survey, what it came to, and the keyframes it was made on.
+
+    `expired` is an answer that has grown too old: read again from the same keyframes it does not come back.
+    """
 
     answer: Answer | None = None
-    survey: Survey | None = None
+    compared: Comparison | None = None
     outcome: str = NOT_SURVEYED
     surveyed: tuple[KeyframeId, KeyframeId] | None = None
+    expired: Answer | None = None
 
     @property
     def measured(self) -> bool:
@@ -42,9 +50,10 @@ class PairRecord:
         return self.answer is not None and self.answer.found_by is FoundBy.IMAGE
 
     @property
-    def unmatched(self) -> bool:
-        """Were the images compared, and did not match?"""
-        return self.outcome in _UNMATCHED
+    def explained(self) -> bool:
+        """Was the last survey, and with it the planes that it can tell, of the answer's keyframes?"""
+        answer = self.answer
+        return answer is not None and self.surveyed == (answer.first.id, answer.second.id)
 
 
 _NOTHING = PairRecord()
@@ -72,23 +81,26 @@ class Pairs:
         answer = self[pair].answer
         return None if answer is None else answer.overlaps
 
-    def surveyed(self, first: Keyframe, second: Keyframe, survey: Survey | None, now_ns: int) -> None:
-        """Enter a survey, None if it failed. One that measured nothing takes the former answer's place too."""
+    def surveyed(self, first: Keyframe, second: Keyframe, compared: Comparison | None) -> None:
+        """Enter what a survey came to, None if it failed; the answer stands until surfaces are built with it."""
         pair = (first.id.robot, second.id.robot)
-        ids = (first.id, second.id)
-        outcome = FAILED if survey is None else str(survey.outcome)
-        self._records[pair] = PairRecord(None, survey, outcome, ids)
-        self._by_age.pop(pair, None)
-        if survey is None or survey.outcome is not Outcome.MEASURED:
-            return
-        if survey.overlap_first is not None and survey.overlap_second is not None:
-            overlaps = (survey.overlap_first, survey.overlap_second)
-            self._answer(pair, Answer(overlaps, FoundBy.IMAGE, now_ns, first, second))
+        outcome = FAILED if compared is None else str(compared.outcome)
+        self._records[pair] = replace(self[pair], compared=compared, outcome=outcome, surveyed=(first.id, second.id))
 
-    def predicted(self, first: Keyframe, second: Keyframe, overlaps: tuple[float, float], now_ns: int) -> None:
-        """Enter an overlap computed from poses and depths."""
-        pair = (first.id.robot, second.id.robot)
-        self._answer(pair, Answer(overlaps, FoundBy.PREDICTED, now_ns, first, second))
+    def enter(self, pair: Pair, answer: Answer) -> None:
+        """Enter the overlap as read from what is known now.
+
+        Read anew from the same keyframes an answer may be better, but it is no younger.
+        """
+        record = self[pair]
+        if record.expired is not None and _same(record.expired, answer):
+            return
+        if record.answer is not None and _same(record.answer, answer):
+            self._records[pair] = replace(record, answer=replace(answer, computed_ns=record.answer.computed_ns))
+            return
+        self._records[pair] = replace(record, answer=answer, expired=None)
+        self._by_age.pop(pair, None)
+        self._by_age[pair] = answer.computed_ns
 
     def expire(self, now_ns: int) -> list[Pair]:
         """Drop the answers that have become too old to stand for anything; the pairs that are unknown now."""
@@ -99,7 +111,9 @@ class Pairs:
             expired.append(pair)
         for pair in expired:
             del self._by_age[pair]
-            self._records[pair] = replace(self._records[pair], answer=None, survey=None)
+            record = self._records[pair]
+            old = None if record.answer is None else replace(record.answer, outlooks=None)
+            self._records[pair] = replace(record, answer=None, compared=None, expired=old)
         return expired
 
     def forget(self, robot: str) -> None:
@@ -112,7 +126,7 @@ class Pairs:
         """All records now, as a copy."""
         return dict(self._records)
 
-    def _answer(self, pair: Pair, answer: Answer) -> None:
-        self._records[pair] = replace(self[pair], answer=answer)
-        self._by_age.pop(pair, None)
-        self._by_age[pair] = answer.computed_ns
+
+def _same(held: Answer, answer: Answer) -> bool:
+    """Do two answers rest on the same keyframes in the same way?"""
+    return (held.first.id, held.second.id, held.found_by) == (answer.first.id, answer.second.id, answer.found_by)

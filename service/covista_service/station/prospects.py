@@ -1,4 +1,4 @@
-"""What two keyframes may have in common before their images are compared: poses and depths alone."""
+"""What two keyframes have in common, by their outlooks, and whether it is worth comparing their images."""
 
 from __future__ import annotations
 
@@ -6,23 +6,21 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from covista_schemas.reports import FoundBy
 
-from covista_service.perception import frustum
-from covista_service.perception.camera import Floats
 from covista_service.perception.frustum import Frustum
 from covista_service.station.events import Keyframe, KeyframeId
+from covista_service.station.outlooks import Outlook, masks
+from covista_service.station.pairs import Answer
 
 _LEAST_POINTS = 8
 # Matched points show the textured part of a scene only: nearer and farther surfaces may be there.
 _NEARER, _FARTHER = 0.3, 3.0
-# What is left of a prediction when the images were compared and did not match: something may stand between, or the
-# same place look another way. In rendered worlds anything from a quarter to a half halves the error of such pairs.
-UNMATCHED = 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class Depth:
-    """How deep a robot's scene is, by the matched points of a survey of `keyframe`; metres along the optical axis."""
+    """How deep a robot's scene is, by the surface of `keyframe`; metres along the optical axis."""
 
     keyframe: KeyframeId
     points: int
@@ -31,14 +29,12 @@ class Depth:
     far_m: float
 
 
-def depth_of(keyframe: KeyframeId, depths_m: Floats) -> Depth | None:
-    """The depth of a keyframe from its points' depths (k,), None if there are too few."""
-    if len(depths_m) < _LEAST_POINTS:
+def depth_of(outlook: Outlook) -> Depth | None:
+    """The depth of a keyframe by its surface, None if that rests on too few points of its own."""
+    if outlook.points < _LEAST_POINTS:
         return None
-    near, median, far = np.percentile(depths_m, (5, 50, 95))
-    if near <= 0:
-        return None
-    return Depth(keyframe, len(depths_m), float(near), float(median), float(far))
+    near, median, far = np.percentile(1.0 / outlook.surface.inverse_depth, (5, 50, 95))
+    return Depth(outlook.keyframe.id, outlook.points, float(near), float(median), float(far))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,10 +55,16 @@ class Reach:
         return self.keyframe is keyframe and self.depth == depth
 
 
-def predict(first: Keyframe, first_depth: Depth, second: Keyframe, second_depth: Depth) -> tuple[float, float]:
-    """q_1 and q_2 if each image showed a plane at its median depth."""
-    return frustum.overlap(
-        first.camera, first.pose, first_depth.median_m, second.camera, second.pose, second_depth.median_m
+def read(first: Outlook, second: Outlook, now_ns: int, connected: bool) -> Answer:
+    """The overlap of two outlooks: by image where their keyframes share matched points, else predicted.
+
+    `connected`: whether matches connect the two at least by way of others, so that their depths have one scale.
+    """
+    matched = second.keyframe.id in first.matched or first.keyframe.id in second.matched
+    shares = [float(mask.mean()) for mask in masks(first, second, connected=connected or matched)]
+    found_by = FoundBy.IMAGE if matched else FoundBy.PREDICTED
+    return Answer(
+        (shares[0], shares[1]), found_by, now_ns, first.keyframe, second.keyframe, (first, second), connected=connected
     )
 
 

@@ -11,11 +11,12 @@ from covista_schemas.reports import FoundBy, Status
 
 from covista_service.grouping.similarity import Floats
 from covista_service.perception.camera import Camera
-from covista_service.perception.relative_pose import PoseSource
-from covista_service.perception.survey import Survey
+from covista_service.perception.comparison import Comparison
+from covista_service.station.corrections import Correction
 from covista_service.station.events import Keyframe, KeyframeId, Pair
 from covista_service.station.ledger import Counts
 from covista_service.station.options import NS_PER_S, GroupingOptions
+from covista_service.station.outlooks import Outlook
 from covista_service.station.pairs import PairRecord, pair_of
 from covista_service.station.roster import Fix
 
@@ -39,6 +40,7 @@ class RobotView:
     announced: KeyframeId | None
     last_seen_ns: int | None
     clock_offset_s: float | None
+    correction: Correction | None
     keyframes: Counts
     poses: Counts
     last_problem: str | None
@@ -48,8 +50,8 @@ class RobotView:
 class PairView:
     """One pair, a < b. The keyframes are those that the overlaps were computed on.
 
-    `survey` is the last one, whose first image is a's; it explains the overlaps if they were found by image, or by
-    image once and decayed since: that is, if `survey.outcome` is measured.
+    `compared` is what the last survey found, its first image being a's; planes that it can tell explain the overlaps
+    if it is of the same keyframes (`explained`). `outlooks` are what the overlaps were read from.
     """
 
     a: str
@@ -58,20 +60,18 @@ class PairView:
     overlap_b: float | None
     found_by: FoundBy
     outcome: str
-    survey: Survey | None
+    compared: Comparison | None
     keyframe_a: Keyframe | None
     keyframe_b: Keyframe | None
     age_s: float | None
+    explained: bool = False
+    outlooks: tuple[Outlook, Outlook] | None = None
+    connected: bool = True
 
     @property
     def inliers(self) -> int:
         """Matches that agreed with one geometry in the last survey."""
-        return 0 if self.survey is None else self.survey.inliers
-
-    @property
-    def pose_source(self) -> PoseSource | None:
-        """Where the relative pose behind the overlaps came from."""
-        return None if self.survey is None else self.survey.pose_source
+        return 0 if self.compared is None else int(self.compared.pose.inliers.sum())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,17 +129,20 @@ class Snapshot:
         answer = record.answer
         age_ns = 0 if answer is None else self.now_ns - answer.computed_ns
         if answer is None or age_ns >= self.unknown_after_ns:
-            return PairView(a, b, None, None, FoundBy.UNKNOWN, record.outcome, record.survey, None, None, None)
+            return PairView(a, b, None, None, FoundBy.UNKNOWN, record.outcome, record.compared, None, None, None)
         return PairView(
             a,
             b,
             *answer.overlaps,
             FoundBy.DECAYED if age_ns >= self.decay_after_ns else answer.found_by,
             record.outcome,
-            record.survey,
+            record.compared,
             answer.first,
             answer.second,
             age_ns / NS_PER_S,
+            record.explained,
+            answer.outlooks,
+            answer.connected,
         )
 
     def pairs(self) -> Iterator[PairView]:

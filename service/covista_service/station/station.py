@@ -7,6 +7,7 @@ from dataclasses import replace
 from covista_schemas.reports import EventKind, Status
 
 from covista_service.perception.camera import Pose
+from covista_service.station import prospects
 from covista_service.station.events import (
     Effect,
     Event,
@@ -19,6 +20,7 @@ from covista_service.station.events import (
     MessageDropped,
     MessagesReceived,
     PoseArrived,
+    SurfacesBuilt,
     SurveyDone,
     Tick,
     TokenLost,
@@ -30,7 +32,7 @@ from covista_service.station.options import NS_PER_S, GroupingOptions, StationOp
 from covista_service.station.pairs import Pairs, pair_of
 from covista_service.station.roster import Robot, Roster
 from covista_service.station.snapshot import RobotView, Snapshot
-from covista_service.station.surveys import Surveys
+from covista_service.station.surveys import Read, Surveys
 
 
 class Station:
@@ -39,13 +41,14 @@ class Station:
     Arrivals only change what is known; a Tick decides what follows: presence, surveys, groups.
     """
 
-    def __init__(self, options: StationOptions | None = None) -> None:
+    def __init__(self, options: StationOptions | None = None, read: Read = prospects.read) -> None:
+        """`read` tells the overlap of two outlooks."""
         self.options = options or StationOptions()
         self._unknown_after_ns = nanoseconds(self.options.unknown_after_s)
         self._roster = Roster(self.options)
         self._pairs = Pairs(self._unknown_after_ns)
         self._groups = Groups(self.options)
-        self._surveys = Surveys(self._roster, self._pairs, self._groups, self.options)
+        self._surveys = Surveys(self._roster, self._pairs, self._groups, self.options, read)
         self._extractions = Extractions(self.options.capacity)
         self._views: dict[str, RobotView] = {}
         self._snapshot: Snapshot | None = None
@@ -67,8 +70,8 @@ class Station:
                 self._token(event, now_ns)
             case FeaturesExtracted():
                 return self._features_extracted(event)
-            case SurveyDone():
-                return [*self._surveys.done(event, now_ns)]
+            case SurveyDone() | SurfacesBuilt():
+                return self._take(event, now_ns)
             case Tick():
                 return self._tick(now_ns)
         return []
@@ -145,7 +148,7 @@ class Station:
             elif keyframe.id.boot != robot.boot or _older(keyframe, robot.keyframe):
                 self._replace(keyframe)
             else:
-                self._use(robot, replace(keyframe, features=event.features))
+                self._use(robot, replace(keyframe, features=event.features, thumbnail=event.thumbnail))
         return self._extract()
 
     def _pose_arrived(self, event: PoseArrived) -> None:
@@ -159,6 +162,12 @@ class Station:
             robot.pose_sequence = event.sequence
             newest = self._locate(robot, event.pose, event.time_ns, event.boot)
         ledger.settle(message, "used" if newest else "replaced")
+
+    def _take(self, event: SurveyDone | SurfacesBuilt, now_ns: int) -> list[Effect]:
+        if isinstance(event, SurfacesBuilt):
+            for name in event.job.keyframes:
+                self._views.pop(name.robot, None)
+        return [*self._surveys.take(event, now_ns)]
 
     def _use(self, robot: Robot, keyframe: Keyframe) -> None:
         robot.ledgers["keyframe"].settle((keyframe.id.boot, keyframe.id.sequence), "used")
@@ -263,6 +272,7 @@ class Station:
             announced=robot.announced,
             last_seen_ns=robot.last_seen_ns,
             clock_offset_s=None if offset_ns is None else offset_ns / NS_PER_S,
+            correction=self._surveys.correction(robot.id),
             keyframes=robot.ledgers["keyframe"].counts(),
             poses=robot.ledgers["pose"].counts(),
             last_problem=robot.last_problem,

@@ -1,28 +1,49 @@
-"""From keyframes to overlaps: what is worth a survey, what a survey tells, what stands where none could."""
+"""From keyframes to overlaps: what is worth a survey, the surfaces that surveys feed, and what is read from those."""
 
 from __future__ import annotations
 
-from covista_schemas.reports import EventKind
+from collections.abc import Callable
 
-from covista_service.perception.camera import View
-from covista_service.perception.survey import Outcome
+from covista_schemas.reports import EventKind, FoundBy
+
+from covista_service.perception.scene import Evidence
 from covista_service.station import prospects
 from covista_service.station.agenda import Agenda
-from covista_service.station.events import Happened, Keyframe, KeyframeId, Pair, SurveyDone, SurveyPair
+from covista_service.station.corrections import Correction, Corrections
+from covista_service.station.events import (
+    Effect,
+    Happened,
+    Keyframe,
+    KeyframeId,
+    Pair,
+    SurfacesBuilt,
+    SurveyDone,
+    SurveyPair,
+)
 from covista_service.station.groups import Groups
 from covista_service.station.options import StationOptions
-from covista_service.station.pairs import Pairs, pair_of
+from covista_service.station.outlooks import Outlook, Outlooks, view_of
+from covista_service.station.pairs import Answer, Pairs, pair_of
 from covista_service.station.roster import Robot, Roster
+
+# The overlap of two outlooks now, which matches connect or do not.
+Read = Callable[[Outlook, Outlook, int, bool], Answer]
 
 
 class Surveys:
     """Feeds the agenda with what robots may see in common, and pairs and groups with what surveys find."""
 
-    def __init__(self, roster: Roster, pairs: Pairs, groups: Groups, options: StationOptions) -> None:
+    def __init__(
+        self, roster: Roster, pairs: Pairs, groups: Groups, options: StationOptions, read: Read = prospects.read
+    ) -> None:
         self._roster = roster
         self._pairs = pairs
         self._groups = groups
+        self._capacity = options.capacity
+        self._overlap_of = read
         self._agenda = Agenda(roster, pairs, options)
+        self._outlooks = Outlooks()
+        self._corrections = Corrections()
         self._to_judge: dict[str, None] = {}
         self._reaches: dict[str, prospects.Reach] = {}
         # Keyframes in use that no survey has seen yet, and those whose first survey is in since the last evaluation.
@@ -30,13 +51,17 @@ class Surveys:
         self._seen: list[tuple[KeyframeId, int]] = []
 
     def keyframe(self, robot: Robot, keyframe: Keyframe) -> None:
-        """Use a robot's new keyframe. What is known of its pairs stands until they are surveyed anew."""
+        """Use a robot's new keyframe. What is known of its pairs stands until it has a surface of its own."""
         robot.keyframe = keyframe
         unseen = self._unseen.get(robot.id, {})
-        self._unseen[robot.id] = {held: at for held, at in unseen.items() if self._agenda.under_way(at)}
+        self._unseen[robot.id] = {
+            held: at for held, at in unseen.items() if self._agenda.under_way(at) or self._outlooks.building(at)
+        }
         self._unseen[robot.id][keyframe.id] = keyframe
         self._to_judge.setdefault(robot.id)
+        earlier = self._outlooks.keyframe(keyframe)
         self._agenda.fresh(robot.id)
+        self._agenda.moved(robot.id, earlier)
 
     def judge(self, now_ns: int) -> bool:
         """Judge the pairs of all robots with a new keyframe or depth: may they meet, and what is to be expected?
@@ -52,38 +77,24 @@ class Surveys:
             self._judge(pair, now_ns)
         return bool(together)
 
-    def start(self, now_ns: int) -> list[SurveyPair]:
-        """As many surveys as there are hands for."""
-        started: list[SurveyPair] = []
-        while keyframes := self._agenda.start(now_ns):
-            first, second = keyframes
-            record = self._pairs[first.id.robot, second.id.robot]
-            prior = record.survey if record.measured else None
-            started.append(SurveyPair(first.id, second.id, _view(first), _view(second), prior))
+    def start(self, now_ns: int) -> list[Effect]:
+        """As many surfaces, and then surveys, as there are hands for."""
+        started: list[Effect] = []
+        started += self._outlooks.start(self._capacity - self._outlooks.under_way)
+        while self._agenda.under_way_count + self._outlooks.under_way < self._capacity:
+            keyframes = self._agenda.start(now_ns)
+            if keyframes is None:
+                break
+            started.append(self._survey(*keyframes))
         return started
 
-    def done(self, event: SurveyDone, now_ns: int) -> list[Happened]:
-        """Take in what a survey found; one that measured nothing leaves the word to the prediction."""
-        pair = (event.first.robot, event.second.robot)
-        keyframes = self._agenda.done(event.first, event.second)
-        first, second = self._roster.get(pair[0]), self._roster.get(pair[1])
-        if keyframes is None or first is None or second is None:
-            return []
-        self._pairs.surveyed(*keyframes, event.survey, now_ns)
-        self._agenda.again(pair)
-        if event.survey is None:
-            text = f"the survey of {pair[0]} and {pair[1]} failed: {event.problem}"
-            self._expect(pair, now_ns)
-            return [Happened(EventKind.WARNING, now_ns, text, pair)]
-        self._note(event.first)
-        self._note(event.second)
-        self._deepen(first, prospects.depth_of(event.first, event.survey.depths_first))
-        self._deepen(second, prospects.depth_of(event.second, event.survey.depths_second))
-        if event.survey.outcome is not Outcome.MEASURED:
-            self._expect(pair, now_ns)
-        else:
-            self._groups.see(pair, self._pairs.overlaps(pair))
-        return []
+    def take(self, event: SurveyDone | SurfacesBuilt, now_ns: int) -> list[Happened]:
+        """Take in what a worker has found."""
+        return self._surveyed(event, now_ns) if isinstance(event, SurveyDone) else self._built(event, now_ns)
+
+    def correction(self, robot: str) -> Correction | None:
+        """How far a robot's reported pose is off, None while nothing is known of it."""
+        return self._corrections[robot]
 
     def seen(self) -> tuple[tuple[KeyframeId, int], ...]:
         """Keyframes, with their arrival, whose first survey has come in since this was asked last."""
@@ -94,22 +105,66 @@ class Surveys:
         """Drop a robot and its pairs."""
         self._agenda.forget(robot)
         self._pairs.forget(robot)
+        self._outlooks.forget(robot)
+        self._corrections.forget(robot)
         self._to_judge.pop(robot, None)
         self._reaches.pop(robot, None)
         self._unseen.pop(robot, None)
 
+    def _surveyed(self, event: SurveyDone, now_ns: int) -> list[Happened]:
+        """Surfaces are built with what a survey found next."""
+        pair = (event.first.robot, event.second.robot)
+        keyframes = self._agenda.done(event.first, event.second)
+        if keyframes is None or any(robot not in self._roster for robot in pair):
+            return []
+        self._outlooks.surveyed(event.first, event.second, None if event.found is None else Evidence.of(event.found))
+        if pair[0] != pair[1]:
+            self._pairs.surveyed(*keyframes, event.found)
+            self._judge(pair, now_ns)
+            self._agenda.again(pair)
+        if event.found is None:
+            text = f"the survey of {pair[0]} and {pair[1]} failed: {event.problem}"
+            return [Happened(EventKind.WARNING, now_ns, text, tuple(dict.fromkeys(pair)))]
+        return []
+
+    def _built(self, event: SurfacesBuilt, now_ns: int) -> list[Happened]:
+        """All overlaps that new surfaces have part in are read anew."""
+        happened: list[Happened] = []
+        before = {name.robot: self._outlooks[name.robot] for name in event.job.keyframes}
+        for keyframe in self._outlooks.built(event):
+            robot, held = self._roster[keyframe.id.robot], before[keyframe.id.robot]
+            outlook = self._outlooks[robot.id]
+            if outlook is not None:
+                again = held is not None and held.keyframe is keyframe
+                happened += self._corrections.note(outlook, now_ns, again=again)
+                self._deepen(robot, outlook)
+                self._read(outlook, now_ns)
+            self._note(keyframe.id)
+        if event.settled is None:
+            opened = [name for name, sight in zip(event.job.keyframes, event.job.sights, strict=True) if sight.open]
+            robots = tuple(name.robot for name in opened)
+            text = f"the surfaces of {' and '.join(robots)} could not be built: {event.problem}"
+            happened.append(Happened(EventKind.WARNING, now_ns, text, robots))
+        return happened
+
+    def _survey(self, first: Keyframe, second: Keyframe) -> SurveyPair:
+        one, other = (view_of(keyframe, self._outlooks.pose(keyframe)) for keyframe in (first, second))
+        return SurveyPair(first.id, second.id, one, other)
+
     def _judge(self, pair: Pair, now_ns: int) -> None:
         first, second = self._roster[pair[0]], self._roster[pair[1]]
-        record = self._pairs[pair]
         if first.keyframe is None or second.keyframe is None:
             return
         # What was seen in common is worth another look, if only to find that it is no more.
-        overlapped = record.measured and sum(self._pairs.overlaps(pair) or ()) > 0
+        record = self._pairs[pair]
+        looked = record.surveyed == (first.keyframe.id, second.keyframe.id)
+        overlapped = record.measured and not looked and sum(self._pairs.overlaps(pair) or ()) > 0
         reaches = self._reach(first, first.keyframe), self._reach(second, second.keyframe)
         plausible = overlapped or reaches[0].frustum.may_meet(reaches[1].frustum)
-        if not record.measured:
-            self._expect(pair, now_ns, plausible=plausible)
         self._agenda.judge(pair, plausible=plausible)
+        if not plausible:
+            self._pairs.enter(pair, Answer((0.0, 0.0), FoundBy.PREDICTED, now_ns, first.keyframe, second.keyframe))
+            self._groups.see(pair, (0.0, 0.0))
 
     def _reach(self, robot: Robot, keyframe: Keyframe) -> prospects.Reach:
         held = self._reaches.get(robot.id)
@@ -117,36 +172,30 @@ class Surveys:
             held = self._reaches[robot.id] = prospects.Reach.of(keyframe, robot.depth)
         return held
 
-    def _expect(self, pair: Pair, now_ns: int, *, plausible: bool = True) -> None:
-        """Answer from poses and depths, where both depths are known."""
-        first, second = self._roster[pair[0]], self._roster[pair[1]]
-        if first.keyframe is not None and second.keyframe is not None and first.depth and second.depth:
-            overlaps = (0.0, 0.0)
-            if plausible:
-                doubt = prospects.UNMATCHED if self._pairs[pair].unmatched else 1.0
-                q_first, q_second = prospects.predict(first.keyframe, first.depth, second.keyframe, second.depth)
-                overlaps = (doubt * q_first, doubt * q_second)
-            self._pairs.predicted(first.keyframe, second.keyframe, overlaps, now_ns)
-        self._groups.see(pair, self._pairs.overlaps(pair))
+    def _read(self, outlook: Outlook, now_ns: int) -> None:
+        """Read the overlaps of a robot's outlook with those of all whose views may meet its own."""
+        robot, parts = outlook.keyframe.id.robot, self._outlooks.connected()
+        for other in sorted(self._agenda.partners(robot)):
+            beside = self._outlooks[other]
+            if beside is not None:
+                pair = pair_of(robot, other)
+                both = (outlook, beside) if pair[0] == robot else (beside, outlook)
+                answer = self._overlap_of(*both, now_ns, parts[robot] == parts[other])
+                self._pairs.enter(pair, answer)
+                self._groups.see(pair, self._pairs.overlaps(pair))
 
     def _note(self, keyframe: KeyframeId) -> None:
         unseen = self._unseen.get(keyframe.robot, {}).pop(keyframe, None)
         if unseen is not None:
             self._seen.append((keyframe, unseen.arrived_ns))
 
-    def _deepen(self, robot: Robot, depth: prospects.Depth | None) -> None:
-        """Take the depth with the most points that is known of a robot's keyframe in use; an older one until then."""
-        held = robot.depth
-        if depth is None or (robot.keyframe is not None and depth.keyframe != robot.keyframe.id and held is not None):
+    def _deepen(self, robot: Robot, outlook: Outlook) -> None:
+        """Take the depth that a robot's surface tells; who may see what it sees is judged by it."""
+        depth, held = prospects.depth_of(outlook), robot.depth
+        if depth is None:
             return
         if held is None or held.keyframe != depth.keyframe:
             self._to_judge.setdefault(robot.id)
         elif held.points >= depth.points:
             return
         robot.depth = depth
-
-
-def _view(keyframe: Keyframe) -> View:
-    if keyframe.features is None:
-        raise ValueError(f"{keyframe.id} has no features yet")
-    return View(keyframe.camera, keyframe.pose, keyframe.features)

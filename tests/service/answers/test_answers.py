@@ -4,44 +4,42 @@ from covista_schemas.reports import FoundBy, GroupBounds
 from covista_service import answers
 from covista_service.answers.robots import quaternion_of
 from covista_service.perception.camera import Pose, rotation_of
-from covista_service.perception.survey import Outcome, Plane, Survey
+from covista_service.perception.comparison import Comparison
+from covista_service.perception.relative_pose import RelativePose
+from covista_service.perception.sightings import Sightings
 from covista_service.station.events import MessageDropped, SurveyPair
 from covista_service.station.options import GroupingOptions
 from covista_service.station.snapshot import Snapshot
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.service.station.scenes import AHEAD, START_NS, Scene
+from tests.service.perception.scenes import project
+from tests.service.station.scenes import AHEAD, CAMERA, START_NS, Found, Scene
 
 TURNED = rotation_of((0.5, 0.5, -0.5, 0.5))
-REGION_A = np.array([[10.0, 0], [20, 0], [20, 30]])
-REGION_B = np.array([[1.0, 2], [3, 4], [5.123456, 6]])
-# z = 4 in the first camera.
-WALL = Plane(np.array([0, 0, -0.25]), 20, REGION_A, REGION_B)
+FIRST = Pose(TURNED, np.array([1.0, 2.0, 3.0]))
+# Half a metre to the right of the first camera.
+SECOND = Pose(TURNED, FIRST.centre_m + TURNED @ np.array([0.5, 0, 0]))
+# Points of the plane z = 4 of the first camera.
+ON_WALL = np.column_stack((np.random.default_rng(0).uniform(-1.2, 1.2, (40, 2)), np.full(40, 4.0)))
 
 
-def survey_of(job: SurveyPair) -> Survey:
-    depths_m = np.full(20, 4.0)
-    return Survey(
-        Outcome.MEASURED,
-        0.25,
-        0.75,
-        inliers=20,
-        pose_source="images",
-        planes=(WALL,),
-        depths_first=depths_m,
-        depths_second=depths_m,
-    )
+def both_see_the_wall(job: SurveyPair) -> Found:
+    """What comparing the images of two keyframes before a wall comes to."""
+    pose = RelativePose(np.eye(3), np.array([-0.5, 0, 0]), "reported", np.ones(len(ON_WALL), bool), True)
+    one, other = (project(CAMERA, Pose(np.eye(3), np.array([x, 0, 0])), ON_WALL) for x in (0.0, 0.5))
+    matches = np.column_stack(2 * [np.arange(len(ON_WALL))])
+    return Found(Comparison(True, matches, Sightings(CAMERA, CAMERA, one, other), pose), (0.25, 0.75))
 
 
 @pytest.fixture(scope="module")
 def scene() -> Scene:
     scene = Scene()
-    scene.send("r1", Pose(TURNED, np.array([1.0, 2.0, 3.0])))
-    scene.send("r2", Pose(AHEAD, np.array([0.5, 0.0, 0.0])))
-    scene.settle(survey_of)
+    scene.send("r1", FIRST)
+    scene.send("r2", SECOND)
+    scene.settle(both_see_the_wall)
     scene.receive(MessageDropped("r3", "pose", "malformed", "payload: garbage", START_NS, counted=False, count=2))
-    scene.settle(survey_of)
+    scene.settle(both_see_the_wall)
     scene.wait(2)
     return scene
 
@@ -81,11 +79,18 @@ def test_a_pair_is_told_in_the_order_asked(snapshot: Snapshot) -> None:
     assert (forward.a, forward.b, forward.overlap_a, forward.overlap_b) == ("r1", "r2", 0.25, 0.75)
     assert (back.a, back.b, back.overlap_a, back.overlap_b) == ("r2", "r1", 0.75, 0.25)
     assert (forward.regions_a, forward.regions_b) == (back.regions_b, back.regions_a)
-    assert forward.regions_a == [[(10, 0), (20, 0), (20, 30)]]
-    assert forward.regions_b[0][2] == (5.12, 6)
     assert forward.planes[0].polygon_a == back.planes[0].polygon_b
-    assert (forward.found_by, forward.outcome, forward.pose_source) == (FoundBy.IMAGE, "measured", "images")
+    assert forward.planes[0].polygon_b == back.planes[0].polygon_a
+    assert (forward.found_by, forward.outcome, forward.pose_source) == (FoundBy.IMAGE, "measured", "reported")
     assert forward.age_s == 2
+
+
+def test_regions_are_what_the_surfaces_show(snapshot: Snapshot) -> None:
+    """Half a metre aside at four metres: all but the leftmost 37.5 px of the first image."""
+    (region,) = answers.pair_report(snapshot, "r1", "r2").regions_a
+    left, right = min(x for x, _ in region), max(x for x, _ in region)
+    assert left == pytest.approx(37.0, abs=320 / 48)
+    assert right == 319.5
 
 
 def test_planes_are_in_the_world(snapshot: Snapshot) -> None:
@@ -93,7 +98,7 @@ def test_planes_are_in_the_world(snapshot: Snapshot) -> None:
     (plane,) = answers.pair_report(snapshot, "r1", "r2").planes
     for seen in ([0, 0, 4], [1, -2, 4], [-3, 0.5, 4]):
         world = TURNED @ np.array(seen, float) + [1, 2, 3]
-        assert np.dot(plane.normal, world) + plane.offset_m == pytest.approx(0, abs=1e-12)
+        assert np.dot(plane.normal, world) + plane.offset_m == pytest.approx(0, abs=1e-6)
     assert np.linalg.norm(plane.normal) == pytest.approx(1)
 
 

@@ -45,14 +45,14 @@ def test_what_the_other_does_not_see_is_dimmed() -> None:
 
 def test_planes_have_colours_of_their_own() -> None:
     right_half = LEFT_HALF + np.array([160, 0])
-    found = drawn(overlay(keyframe(image=IMAGE), CommonField((LEFT_HALF, right_half)), "two"))
+    found = drawn(overlay(keyframe(image=IMAGE), CommonField(polygons_px=(LEFT_HALF, right_half)), "two"))
     left, right = found[200:300, 100:200].mean(axis=(0, 1)), found[200:300, 420:520].mean(axis=(0, 1))
     assert np.abs(left - right).max() > 20
 
 
 def test_points_lie_at_pixel_centres() -> None:
     point = np.array([[40.0, 50.0]])
-    found = drawn(overlay(keyframe(image=IMAGE), CommonField((LEFT_HALF,), point, (0,)), "point"))
+    found = drawn(overlay(keyframe(image=IMAGE), CommonField((), (LEFT_HALF,), point, (0,)), "point"))
     yellow = (np.abs(found[:480].astype(int) - canvas.YELLOW) < 40).all(axis=2)
     rows, columns = np.nonzero(yellow)
     assert (columns.mean(), rows.mean()) == pytest.approx((2 * 40.5 - 0.5, 2 * 50.5 - 0.5), abs=0.5)

@@ -1,12 +1,19 @@
 """A station with hands that answer at once, and rovers that look at a wall."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from covista_service.perception.agreement import DepthPoints, Observations
 from covista_service.perception.camera import Camera, Features, Pose
-from covista_service.perception.survey import Outcome, Survey
+from covista_service.perception.comparison import Comparison
+from covista_service.perception.relative_pose import RelativePose
+from covista_service.perception.scene import Evidence, Settled
+from covista_service.perception.sightings import Sightings
+from covista_service.perception.surface import flat
+from covista_service.station import prospects
 from covista_service.station.events import (
+    BuildSurfaces,
     Effect,
     Event,
     ExtractFeatures,
@@ -19,11 +26,14 @@ from covista_service.station.events import (
     MessagesReceived,
     Pair,
     PoseArrived,
+    SurfacesBuilt,
     SurveyDone,
     SurveyPair,
     Tick,
 )
 from covista_service.station.options import StationOptions
+from covista_service.station.outlooks import Outlook
+from covista_service.station.pairs import Answer
 from covista_service.station.snapshot import Snapshot
 from covista_service.station.station import Station
 
@@ -39,26 +49,51 @@ def pose(x_m: float = 0.0, world_from_camera: np.ndarray = AHEAD) -> Pose:
     return Pose(world_from_camera, np.array([x_m, 0.0, 0.0]))
 
 
-def measured(q_first: float = 0.5, q_second: float = 0.6, depth_m: float = 4.0) -> Survey:
-    depths_m = np.full(20, depth_m)
-    return Survey(Outcome.MEASURED, q_first, q_second, inliers=20, depths_first=depths_m, depths_second=depths_m.copy())
+def comparison(matches: int, *, verified: bool = True, enough: bool = True, comparable: bool = True) -> Comparison:
+    """What comparing two keyframes comes to when so many of their keypoints match."""
+    indices = np.column_stack((np.arange(matches), np.arange(matches)))
+    points = np.zeros((matches, 2))
+    pose = RelativePose(np.eye(3), np.array([-1.0, 0, 0]), "reported", np.ones(matches, bool), verified)
+    return Comparison(comparable, indices, Sightings(CAMERA, CAMERA, points, points), pose, enough)
 
 
-NOTHING = Survey(Outcome.FEW_MATCHES, matches=3)
+@dataclass(frozen=True)
+class Found:
+    """What hands find of a pair, and the overlaps that its outlooks are to tell; by their geometry if None."""
+
+    comparison: Comparison
+    shares: tuple[float, float] | None = None
+
+
+def measured(q_first: float = 0.5, q_second: float = 0.6) -> Found:
+    return Found(comparison(9), (q_first, q_second))
+
+
+SEEN = Found(comparison(9))
+NOTHING = Found(comparison(0, verified=False, enough=False))
+Find = Callable[[SurveyPair], Found | None]
 
 
 @dataclass
 class Scene:
-    """Drives a station: time stands still unless `wait` passes it, and nothing happens by itself."""
+    """Drives a station: time stands still unless `wait` passes it, and nothing happens by itself but surfaces.
 
-    station: Station = field(default_factory=lambda: Station(StationOptions(regroup_after_s=0.0)))
+    Those are built at once: walls `depth_m` ahead of every keyframe that something matches.
+    """
+
+    options: StationOptions = field(default_factory=lambda: StationOptions(regroup_after_s=0.0))
     now_ns: int = START_NS
+    depth_m: float = 4.0
+    shares: dict[Pair, tuple[float, float]] = field(default_factory=dict)
     told: list[Effect] = field(default_factory=list)
     sequences: dict[tuple[str, str, str], int] = field(default_factory=dict)
 
     @classmethod
     def of(cls, **options: object) -> "Scene":
-        return cls(Station(StationOptions(**{"regroup_after_s": 0.0, **options})))
+        return cls(StationOptions(**{"regroup_after_s": 0.0, **options}))
+
+    def __post_init__(self) -> None:
+        self.station = Station(self.options, self._read)
 
     def receive(self, *events: Event) -> list[Effect]:
         effects = [effect for event in events for effect in self.station.receive(event, self.now_ns)]
@@ -66,7 +101,26 @@ class Scene:
         return effects
 
     def tick(self) -> list[Effect]:
-        return self.receive(Tick())
+        effects = todo = self.receive(Tick())
+        while jobs := [effect for effect in todo if isinstance(effect, BuildSurfaces)]:
+            for job in jobs:
+                effects += self.receive(self.wall_ahead(job))
+            todo = self.receive(Tick())
+            effects += todo
+        return effects
+
+    def wall_ahead(self, job: BuildSurfaces) -> SurfacesBuilt:
+        """Every keyframe that matches another sees a wall; what has no match keeps what it had."""
+        evidence = {pair: observed(said, self.depth_m) for pair, said in job.evidence.items()}
+        settled = []
+        for k, sight in enumerate(job.sights):
+            count = sum(said.matched for pair, said in evidence.items() if k in pair) + sum(map(len, sight.beside))
+            surface = flat(1 / self.depth_m) if count else sight.former
+            points = DepthPoints(
+                np.zeros((count, 2)), *(np.full(count, value) for value in (1 / self.depth_m, 0.01, 1))
+            )
+            settled.append(Settled(sight.pose, surface, points))
+        return SurfacesBuilt(job, tuple(settled), evidence)
 
     def wait(self, seconds: float) -> list[Effect]:
         self.now_ns += round(seconds * S)
@@ -115,31 +169,51 @@ class Scene:
             PoseArrived(robot, boot, number, sent_ns, self.now_ns, at),
         )
 
-    def work(
-        self, effects: Iterable[Effect], find: Callable[[SurveyPair], Survey | None] = lambda job: measured()
-    ) -> list[Effect]:
+    def work(self, effects: Iterable[Effect], find: Find = lambda job: measured()) -> list[Effect]:
         """Do what is asked, and what follows from it, until nothing is left to do; all that was told."""
         todo, told = list(effects), []
         while todo:
             told += todo
             for effect in todo:
                 if isinstance(effect, SurveyPair):
-                    self.receive(SurveyDone(effect.first, effect.second, find(effect)))
+                    told += self.done(effect, find(effect))
                 elif isinstance(effect, ExtractFeatures):
                     self.receive(FeaturesExtracted(effect.keyframe.id, FEATURES))
             todo = self.tick()
         return told
 
-    def settle(self, find: Callable[[SurveyPair], Survey | None] = lambda job: measured()) -> list[Effect]:
+    def settle(self, find: Find = lambda job: measured()) -> list[Effect]:
         return self.work(self.tick(), find)
+
+    def done(self, job: SurveyPair, found: Found | None) -> list[Effect]:
+        """A worker is back with what it found."""
+        pair = (job.first.robot, job.second.robot)
+        self.shares.pop(pair, None)
+        if found is not None and found.shares is not None:
+            self.shares[pair] = found.shares
+        return self.receive(SurveyDone(job.first, job.second, None if found is None else found.comparison))
+
+    def _read(self, first: Outlook, second: Outlook, now_ns: int, connected: bool) -> Answer:
+        answer = prospects.read(first, second, now_ns, connected)
+        shares = self.shares.get((first.keyframe.id.robot, second.keyframe.id.robot))
+        return answer if shares is None else replace(answer, overlaps=shares)
 
     @property
     def snapshot(self) -> Snapshot:
         return self.station.snapshot(self.now_ns)
 
 
+def observed(said: Evidence, depth_m: float) -> Evidence:
+    """Evidence with a depth for each match."""
+    count = len(said.matches)
+    depths = Observations(np.arange(count), np.full(count, 1 / depth_m), np.full(count, 0.01), np.ones(count, bool))
+    return Evidence(said.matches, said.link, (np.eye(3), np.zeros(3)), (depths, depths))
+
+
 def surveys(effects: Iterable[Effect]) -> list[Pair]:
-    return [(job.first.robot, job.second.robot) for job in effects if isinstance(job, SurveyPair)]
+    """Pairs of robots that were surveyed; a robot's own motion is none."""
+    jobs = [job for job in effects if isinstance(job, SurveyPair)]
+    return [(job.first.robot, job.second.robot) for job in jobs if job.first.robot != job.second.robot]
 
 
 def happenings(effects: Iterable[Effect]) -> list[tuple[str, str]]:

@@ -3,7 +3,7 @@
 from collections import Counter
 from itertools import combinations
 
-from covista_service.station.events import SurveyDone, SurveyPair
+from covista_service.station.events import SurveyPair
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -38,7 +38,7 @@ def test_there_are_never_more_surveys_under_way_than_hands(capacity: int, robots
         assert len(set(pairs)) == len(pairs)
         if under_way and turn % 2:
             done = under_way.pop(0)
-            scene.receive(SurveyDone(done.first, done.second, measured()))
+            scene.done(done, measured())
 
 
 def test_a_survey_under_way_does_not_hold_up_other_pairs() -> None:
@@ -76,7 +76,7 @@ def overload(seconds: int, rates: dict[str, int], surveys_per_s: int) -> tuple[C
             for _ in range(due):
                 scene.send(robot, pose(0.1 * number))
         for job in under_way:
-            scene.receive(SurveyDone(job.first, job.second, measured()))
+            scene.done(job, measured())
         under_way = jobs(scene.wait(step_s))
         for job in under_way:
             pair = (job.first.robot, job.second.robot)
@@ -114,7 +114,7 @@ def test_a_new_keyframe_is_seen_before_old_pairs_are_seen_again() -> None:
     done = 0
     while not any(name == keyframe for name, _ in evaluated(effects)):
         (job,) = jobs(effects)
-        effects = [*scene.receive(SurveyDone(job.first, job.second, measured())), *scene.tick()]
+        effects = [*scene.done(job, measured()), *scene.tick()]
         done += 1
     assert done <= 8
 

@@ -51,7 +51,7 @@ def test_an_image_is_extracted_first() -> None:
 def test_an_image_that_cannot_be_used_is_dropped_with_its_reason() -> None:
     scene = Scene()
     scene.send("r1", image=True)
-    scene.receive(FeaturesExtracted(KeyframeId("r1", "b0", 0), None, "truncated", "image ends early"))
+    scene.receive(FeaturesExtracted(KeyframeId("r1", "b0", 0), None, code="truncated", problem="image ends early"))
     assert counts(scene) == Counts(received=1, dropped={"truncated": 1})
     assert scene.snapshot.robots["r1"].last_problem == "image ends early"
 
@@ -236,7 +236,7 @@ def test_accounts_balance_whatever_comes(messages: list[tuple[str, str, str, int
             effects = scene.wait(70 * sequence)
         elif under_way:
             features = FEATURES if kind == "extracted" else None
-            effects = scene.receive(FeaturesExtracted(under_way.pop(0), features, "bad", "bad"))
+            effects = scene.receive(FeaturesExtracted(under_way.pop(0), features, code="bad", problem="bad"))
         under_way += extractions(effects)
         for view in scene.snapshot.robots.values():
             for account in (view.keyframes, view.poses):

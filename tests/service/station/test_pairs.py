@@ -3,11 +3,25 @@
 import numpy as np
 import pytest
 from covista_schemas.reports import FoundBy
-from covista_service.perception.survey import Outcome, Survey
-from covista_service.station.events import KeyframeId, SurveyDone, SurveyPair
+from covista_service.perception.comparison import Comparison, Outcome
+from covista_service.station.events import BuildSurfaces, KeyframeId, SurfacesBuilt, SurveyDone, SurveyPair, Tick
 from covista_service.station.snapshot import PairView
 
-from tests.service.station.scenes import BACK, NOTHING, Scene, happenings, measured, pose, surveys
+from tests.service.station.scenes import (
+    BACK,
+    NOTHING,
+    SEEN,
+    Found,
+    Scene,
+    comparison,
+    happenings,
+    measured,
+    pose,
+    surveys,
+)
+
+# One metre aside at four metres: 75 px of 320, to within half a cell of the surface at either side.
+ASIDE = pytest.approx(1 - 75 / 320, abs=1 / 48)
 
 
 def pair(scene: Scene, a: str = "r1", b: str = "r2") -> PairView:
@@ -42,8 +56,7 @@ def test_a_survey_answers_for_the_smaller_id_first() -> None:
     for view in (pair(scene, "r1", "r2"), pair(scene, "r2", "r1")):
         assert (view.a, view.b) == ("r1", "r2")
         assert (view.overlap_a, view.overlap_b, view.found_by) == (0.3, 0.7, FoundBy.IMAGE)
-        assert (view.outcome, view.inliers) == ("measured", 20)
-        assert view.survey is not None
+        assert (view.outcome, view.inliers, view.explained) == ("measured", 9, True)
 
 
 def test_an_unknown_robot_makes_no_pair() -> None:
@@ -62,34 +75,21 @@ def test_a_new_keyframe_keeps_the_answer_until_it_is_surveyed() -> None:
     assert (pair(scene).overlap_a, names(pair(scene)), pair(scene).age_s) == (0.4, (1, 0), 0.0)
 
 
-def test_a_survey_starts_from_the_last_result_if_that_was_a_measurement() -> None:
-    scene = two_robots()
-    scene.send("r1")
-    (job,) = [effect for effect in scene.tick() if isinstance(effect, SurveyPair)]
-    assert job.prior is pair(scene).survey
-    scene.work([job], lambda job: NOTHING)
-    scene.send("r1")
-    (job,) = [effect for effect in scene.tick() if isinstance(effect, SurveyPair)]
-    assert job.prior is None
-
-
 def test_a_survey_without_a_result_leaves_the_word_to_the_prediction() -> None:
-    scene = two_robots(lambda job: measured(0.3, 0.7, depth_m=4.0))
+    scene = two_robots(lambda job: measured(0.3, 0.7))
     scene.send("r1", pose(0))
     scene.settle(lambda job: NOTHING)
     view = pair(scene)
     assert (view.found_by, view.outcome, names(view)) == (FoundBy.PREDICTED, "few_matches", (1, 0))
-    # One metre aside at four metres: 75 px of 320; and images that do not match speak against it.
-    assert view.overlap_a == pytest.approx(0.5 * (1 - 75 / 320))
-    assert view.overlap_b == pytest.approx(0.5 * (1 - 75 / 320))
+    assert (view.overlap_a, view.overlap_b) == (ASIDE, ASIDE)
+    assert not view.compared or not view.compared.pose.verified
 
 
-@pytest.mark.parametrize("outcome", [Outcome.NO_PARALLAX, Outcome.NO_PLANE])
-def test_images_that_match_do_not_speak_against_the_prediction(outcome: Outcome) -> None:
-    scene = two_robots(lambda job: measured(0.3, 0.7, depth_m=4.0))
-    scene.send("r1", pose(0))
-    scene.settle(lambda job: Survey(outcome))
-    assert pair(scene).overlap_a == pytest.approx(1 - 75 / 320)
+def test_overlaps_are_read_from_the_surfaces() -> None:
+    view = pair(two_robots(lambda job: SEEN))
+    assert (view.found_by, view.overlap_a, view.overlap_b) == (FoundBy.IMAGE, ASIDE, ASIDE)
+    assert view.outlooks is not None
+    assert [outlook.keyframe.id.robot for outlook in view.outlooks] == ["r1", "r2"]
 
 
 def test_without_a_depth_nothing_is_predicted() -> None:
@@ -104,7 +104,7 @@ def test_depths_of_other_pairs_serve_a_pair_without_matches() -> None:
     scene.settle(lambda job: NOTHING if (job.first.robot, job.second.robot) == ("r1", "r3") else measured())
     view = pair(scene, "r1", "r3")
     assert view.found_by is FoundBy.PREDICTED
-    assert view.overlap_a == pytest.approx(0.5 * (1 - 150 / 320))
+    assert view.overlap_a == pytest.approx(1 - 150 / 320, abs=1 / 48)
 
 
 def test_who_looks_away_is_predicted_to_see_nothing_in_common() -> None:
@@ -116,15 +116,48 @@ def test_who_looks_away_is_predicted_to_see_nothing_in_common() -> None:
     assert (view.overlap_a, view.overlap_b, view.found_by) == (0.0, 0.0, FoundBy.PREDICTED)
 
 
-def test_a_prediction_follows_the_newest_keyframes() -> None:
-    scene = two_robots()
-    scene.send("r1", pose(0))
-    scene.settle(lambda job: NOTHING)
-    before = pair(scene).overlap_a
+def test_a_keyframe_that_nothing_matches_sees_what_the_last_one_saw() -> None:
+    """The surface is carried over by the motion between the two."""
+    scene = two_robots(lambda job: SEEN)
     scene.send("r1", pose(0.5))
-    scene.tick()
-    assert before is not None
-    assert pair(scene).overlap_a == pytest.approx(before + 0.5 * 37.5 / 320)
+    scene.settle(lambda job: NOTHING)
+    view = pair(scene)
+    assert (view.found_by, names(view)) == (FoundBy.PREDICTED, (1, 0))
+    assert view.overlap_a == pytest.approx(1 - 37.5 / 320, abs=1 / 48)
+
+
+def test_a_robot_s_own_motion_gives_it_a_surface() -> None:
+    scene = two_robots(lambda job: SEEN)
+    scene.send("r1", pose(0.5))
+    scene.settle(lambda job: SEEN if job.first.robot == job.second.robot else NOTHING)
+    (outlook, _) = pair(scene).outlooks or (None, None)
+    assert outlook is not None
+    assert (outlook.keyframe.id.sequence, outlook.points, pair(scene).found_by) == (1, 9, FoundBy.PREDICTED)
+
+
+def test_depths_that_a_replaced_keyframe_gave_stay_with_those_it_gave_them_to() -> None:
+    scene = two_robots(lambda job: SEEN)
+    for _ in range(3):
+        scene.send("r2", pose(1))
+        scene.settle(lambda job: SEEN)
+    (outlook, _) = pair(scene).outlooks or (None, None)
+    assert outlook is not None
+    assert (outlook.keyframe.id.sequence, outlook.points) == (0, 4 * 9)
+
+
+def test_surfaces_that_cannot_be_built_are_a_warning_and_hold_up_nobody() -> None:
+    scene = Scene()
+    for robot, x_m in (("r1", 0), ("r2", 1), ("r3", 2)):
+        scene.send(robot, pose(x_m))
+    first, *todo = [effect for effect in scene.tick() if isinstance(effect, SurveyPair)]
+    scene.done(first, SEEN)
+    building, *more = scene.receive(Tick())
+    assert isinstance(building, BuildSurfaces)
+    effects = scene.receive(SurfacesBuilt(building, None, problem="worker died"))
+    assert happenings(effects) == [("warning", "the surfaces of r1 and r2 could not be built: worker died")]
+    assert pair(scene).found_by is FoundBy.UNKNOWN
+    scene.work([*todo, *more])
+    assert pair(scene, "r1", "r3").found_by is FoundBy.IMAGE
 
 
 def test_an_answer_decays_and_becomes_unknown() -> None:
@@ -192,14 +225,23 @@ def test_a_survey_that_failed_is_a_warning_and_no_answer() -> None:
 def test_a_result_that_nobody_asked_for_changes_nothing() -> None:
     scene = two_robots()
     first, second = KeyframeId("r1", "b0", 0), KeyframeId("r2", "b0", 0)
-    scene.receive(SurveyDone(first, second, measured(0.1, 0.1)))
-    scene.receive(SurveyDone(KeyframeId("r7", "b0", 0), second, measured(0.1, 0.1)))
+    scene.receive(SurveyDone(first, second, NOTHING.comparison))
+    scene.receive(SurveyDone(KeyframeId("r7", "b0", 0), second, NOTHING.comparison))
+    scene.tick()
     assert pair(scene).overlap_a == 0.5
 
 
-@pytest.mark.parametrize("outcome", [outcome for outcome in Outcome if outcome is not Outcome.MEASURED])
-def test_every_outcome_can_be_read(outcome: Outcome) -> None:
-    assert pair(two_robots(lambda job: Survey(outcome))).outcome == str(outcome)
+@pytest.mark.parametrize(
+    ("found", "outcome"),
+    [
+        (comparison(9), Outcome.MEASURED),
+        (comparison(9, verified=False), Outcome.UNVERIFIED),
+        (comparison(3, verified=False, enough=False), Outcome.FEW_MATCHES),
+        (comparison(0, verified=False, enough=False, comparable=False), Outcome.KINDS_DIFFER),
+    ],
+)
+def test_every_outcome_can_be_read(found: Comparison, outcome: Outcome) -> None:
+    assert pair(two_robots(lambda job: Found(found))).outcome == outcome
 
 
 def test_every_pair_of_robots_stands_in_the_list_once() -> None:

@@ -2,9 +2,17 @@
 
 import numpy as np
 from covista_service.perception.camera import Pose
+from covista_service.perception.surface import flat
+from covista_service.station.events import Keyframe
+from covista_service.station.outlooks import Outlook
 from covista_service.station.prospects import Reach, depth_of
 
 from tests.service.station.scenes import AHEAD, BACK, NOTHING, Scene, measured, pose, surveys
+
+
+def outlook(keyframe: Keyframe, points: int = 20) -> Outlook:
+    return Outlook(keyframe, keyframe.pose, flat(1 / 4.0), points, {})
+
 
 FAR_AHEAD = Pose(AHEAD, np.array([0.0, 0.0, 50.0]))
 
@@ -12,7 +20,7 @@ FAR_AHEAD = Pose(AHEAD, np.array([0.0, 0.0, 50.0]))
 def test_a_view_reaches_to_infinity_until_its_depth_is_known() -> None:
     scene = Scene()
     here, there = scene.keyframe("r1", pose()), Reach.of(scene.keyframe("r2", FAR_AHEAD), None)
-    depth = depth_of(here.id, np.full(20, 4.0))
+    depth = depth_of(outlook(here))
     assert Reach.of(here, None).frustum.may_meet(there.frustum)
     assert not Reach.of(here, depth).frustum.may_meet(there.frustum)
 
@@ -20,7 +28,7 @@ def test_a_view_reaches_to_infinity_until_its_depth_is_known() -> None:
 def test_a_reach_is_outdated_by_a_new_keyframe_and_by_a_new_depth() -> None:
     scene = Scene()
     old, new = scene.keyframe("r1"), scene.keyframe("r1")
-    depth = depth_of(old.id, np.full(20, 4.0))
+    depth = depth_of(outlook(old))
     reach = Reach.of(old, depth)
     assert reach.is_of(old, depth)
     assert not reach.is_of(new, depth)

@@ -4,7 +4,7 @@ from dataclasses import FrozenInstanceError
 
 import numpy as np
 import pytest
-from covista_service.station.events import Effect, ExtractFeatures, GroupsEvaluated, SurveyPair, Tick
+from covista_service.station.events import BuildSurfaces, Effect, ExtractFeatures, GroupsEvaluated, SurveyPair, Tick
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -26,7 +26,9 @@ def described(effect: Effect) -> object:
         case ExtractFeatures(keyframe):
             return ("extract", keyframe.id)
         case SurveyPair():
-            return ("survey", effect.first, effect.second, effect.prior is None)
+            return ("survey", effect.first, effect.second)
+        case BuildSurfaces():
+            return ("build", effect.keyframes)
         case _:
             return effect
 
@@ -40,7 +42,7 @@ def play(steps) -> tuple[list[object], Scene]:
         elif kind == "pose":
             scene.send_pose(name, pose(x_m))
         elif kind == "work":
-            scene.work(pending, lambda job, q=x_m / 3, good=good: measured(q, q) if good else NOTHING)
+            scene.work(pending, lambda job, good=good: measured() if good else NOTHING)
             pending = []
         else:
             pending += scene.wait(10 * x_m)

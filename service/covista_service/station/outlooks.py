@@ -1,0 +1,310 @@
+"""What every robot's keyframes show: poses that agree with the images, and surfaces that all pairs feed."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from covista_service.perception.agreement import Observations
+from covista_service.perception.camera import Pose, View, relative
+from covista_service.perception.scene import Evidence, Settled, Sight
+from covista_service.perception.surface import Surface, SurfaceOptions
+from covista_service.perception.visibility import Mask, Seeing, VisibilityOptions, seen
+from covista_service.perception.warp import warped
+from covista_service.station.events import BuildSurfaces, Keyframe, KeyframeId, SurfacesBuilt
+
+# Depths that keyframes replaced since have given to one that is still in use.
+_BESIDE = 8
+# Earlier keyframes of a robot that its next ones are held against.
+_WINDOW = 4
+# A robot's own motion tells depths if it is so large a share of the depth; the nearest to the middle is taken.
+_LEAST_BASELINE, _BEST_BASELINE, _MOST_BASELINE = 0.02, 0.1, 0.4
+
+Names = tuple[KeyframeId, KeyframeId]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outlook:
+    """A keyframe, the pose that stands for it, its surface, and how many points of its own that rests on.
+
+    `matched`: keyframes that share matched points with it, and how many.
+    """
+
+    keyframe: Keyframe
+    pose: Pose
+    surface: Surface
+    points: int
+    matched: Mapping[KeyframeId, int]
+
+
+@dataclass(slots=True, eq=False)
+class _Study:
+    """What is known of a robot: `keyframe` is the newest in use, `outlook` the newest that has a surface."""
+
+    keyframe: Keyframe
+    pose: Pose
+    outlook: Outlook | None = None
+    beside: dict[KeyframeId, Observations] = field(default_factory=dict)
+    earlier: deque[Keyframe] = field(default_factory=lambda: deque(maxlen=_WINDOW))
+
+    def find(self, name: KeyframeId) -> Keyframe | None:
+        """The keyframe of this name, if it is still held."""
+        return next((one for one in (self.keyframe, *self.earlier) if one.id == name), None)
+
+    def lay_beside(self, name: KeyframeId, said: Observations) -> None:
+        """Keep depths that a replaced keyframe has given."""
+        if len(said):
+            self.beside[name] = said
+            while len(self.beside) > _BESIDE:
+                del self.beside[next(iter(self.beside))]
+
+
+class Outlooks:
+    """Outlooks by robot, the evidence between keyframes in use, and what is to be built."""
+
+    def __init__(self, surface: SurfaceOptions | None = None) -> None:
+        self._surface = surface or SurfaceOptions()
+        self._studies: dict[str, _Study] = {}
+        self._evidence: dict[Names, Evidence] = {}
+        # Robots whose surface is to be built anew, those at a worker, and jobs under way.
+        self._stale: dict[str, None] = {}
+        self._at_work: set[str] = set()
+        self.under_way = 0
+
+    def __getitem__(self, robot: str) -> Outlook | None:
+        study = self._studies.get(robot)
+        return None if study is None else study.outlook
+
+    def __iter__(self) -> Iterator[Outlook]:
+        return (study.outlook for study in self._studies.values() if study.outlook is not None)
+
+    def building(self, keyframe: Keyframe) -> bool:
+        """Is the surface of this keyframe on its way, or waiting for its turn?"""
+        study = self._studies.get(keyframe.id.robot)
+        return keyframe.id.robot in self._at_work or (study is not None and keyframe.id.robot in self._stale)
+
+    def keyframe(self, keyframe: Keyframe) -> Keyframe | None:
+        """Take a robot's new keyframe; the earlier one to hold it against, if its motion tells depths."""
+        robot = keyframe.id.robot
+        held = self._studies.get(robot)
+        study = self._studies[robot] = _Study(keyframe, keyframe.pose)
+        if held is None:
+            return None
+        study.outlook = held.outlook
+        study.earlier = held.earlier
+        study.earlier.append(replace(held.keyframe, image=None))
+        self._retire(held.keyframe.id)
+        return None if held.outlook is None else _partner(keyframe, study.earlier, _depth_m(held.outlook))
+
+    def surveyed(self, first: KeyframeId, second: KeyframeId, evidence: Evidence | None) -> None:
+        """Take what a survey found, None if it failed; surfaces of its keyframes still in use are to be built anew."""
+        current = [name for name in (first, second) if self._current(name)]
+        if evidence is not None and current:
+            self._evidence[first, second] = evidence
+        for name in current:
+            self._stale.setdefault(name.robot)
+
+    def pose(self, keyframe: Keyframe) -> Pose:
+        """The pose that stands for a keyframe."""
+        study = self._studies.get(keyframe.id.robot)
+        if study is None:
+            return keyframe.pose
+        if study.keyframe.id == keyframe.id:
+            return study.pose
+        held = study.outlook
+        return held.pose if held is not None and held.keyframe.id == keyframe.id else keyframe.pose
+
+    def start(self, hands: int) -> list[BuildSurfaces]:
+        """At most so many jobs, under way from now on. Two robots whose images contradict each other go together."""
+        jobs: list[BuildSurfaces] = []
+        for robot in list(self._stale):
+            if len(jobs) >= hands:
+                break
+            if robot in self._stale and robot not in self._at_work:
+                together = [robot, *self._fresh_partner(robot)]
+                for one in together:
+                    self._stale.pop(one, None)
+                self._at_work.update(together)
+                jobs.append(self._job(together))
+        self.under_way += len(jobs)
+        return jobs
+
+    def built(self, event: SurfacesBuilt) -> list[Keyframe]:
+        """Take what was built; the keyframes that have an outlook of their own since."""
+        self.under_way -= 1
+        opened = [(k, name) for k, name in enumerate(event.job.keyframes) if event.job.sights[k].open]
+        self._at_work.difference_update(name.robot for _, name in opened)
+        if event.settled is None:
+            return []
+        matched = _matched(event)
+        for (i, j), said in event.evidence.items():
+            self._keep((event.job.keyframes[i], event.job.keyframes[j]), said)
+        taken = [self._take(name, event.settled[k], matched.get(k, {})) for k, name in opened]
+        return [keyframe for keyframe in taken if keyframe is not None]
+
+    def connected(self) -> dict[str, int]:
+        """The part that each robot belongs to: those of one part are connected by matches."""
+        parts: dict[str, int] = {}
+        joined: dict[str, set[str]] = {robot: set() for robot in self._studies}
+        for outlook in self:
+            for other in outlook.matched:
+                if other.robot in joined:
+                    joined[outlook.keyframe.id.robot].add(other.robot)
+                    joined[other.robot].add(outlook.keyframe.id.robot)
+        for robot in joined:
+            reached = [] if robot in parts else [robot]
+            number = len(parts)
+            while reached:
+                one = reached.pop()
+                if one not in parts:
+                    parts[one] = number
+                    reached.extend(joined[one])
+        return parts
+
+    def forget(self, robot: str) -> None:
+        """Drop a robot."""
+        study = self._studies.pop(robot, None)
+        self._stale.pop(robot, None)
+        if study is not None:
+            self._retire(study.keyframe.id)
+
+    def _current(self, name: KeyframeId) -> bool:
+        study = self._studies.get(name.robot)
+        return study is not None and study.keyframe.id == name
+
+    def _keep(self, names: Names, said: Evidence) -> None:
+        """Keep what a job made of evidence: with keyframes that are replaced, the depths alone."""
+        if names not in self._evidence:
+            return
+        self._evidence[names] = said
+        for name in names:
+            if not self._current(name):
+                self._retire(name)
+
+    def _retire(self, name: KeyframeId) -> None:
+        """Drop the evidence of a keyframe that is in use no longer; the depths that it gave to others stay with them.
+
+        What no surface has been built with yet waits for that.
+        """
+        for names in [names for names in self._evidence if name in names]:
+            side = 1 - names.index(name)
+            said, other = self._evidence[names], names[side]
+            if not self._current(other):
+                del self._evidence[names]
+            elif said.observed is not None:
+                del self._evidence[names]
+                self._studies[other.robot].lay_beside(name, said.observed[side])
+
+    def _fresh_partner(self, robot: str) -> list[str]:
+        """Another robot that is stale too, by a survey of the two that no surface has been built with yet."""
+        name = self._studies[robot].keyframe.id
+        for names, said in reversed(self._evidence.items()):
+            if name in names and said.observed is None:
+                other = names[1 - names.index(name)].robot
+                if other != robot and other in self._stale and other not in self._at_work:
+                    return [other]
+        return []
+
+    def _job(self, robots: list[str]) -> BuildSurfaces:
+        """The robots' keyframes, open, among all that there is evidence with."""
+        opened = [self._studies[robot].keyframe for robot in robots]
+        held = {keyframe.id: keyframe for keyframe in opened}
+        evidence: dict[Names, Evidence] = {}
+        for names in [names for names in self._evidence if any(keyframe.id in names for keyframe in opened)]:
+            pair = [self._find(name) for name in names]
+            if None in pair:  # replaced so often that it is held no longer
+                del self._evidence[names]
+                continue
+            held.update({keyframe.id: keyframe for keyframe in pair if keyframe is not None})
+            evidence[names] = self._evidence[names]
+        index = {name: k for k, name in enumerate(held)}
+        count = len(opened)
+        return BuildSurfaces(
+            tuple(held),
+            tuple(self._sight(keyframe, among=k < count) for k, keyframe in enumerate(held.values())),
+            tuple(keyframe.thumbnail if k < count else None for k, keyframe in enumerate(held.values())),
+            {(index[first], index[second]): said for (first, second), said in evidence.items()},
+        )
+
+    def _find(self, name: KeyframeId) -> Keyframe | None:
+        study = self._studies.get(name.robot)
+        return None if study is None else study.find(name)
+
+    def _sight(self, keyframe: Keyframe, *, among: bool) -> Sight:
+        """A keyframe for a job, `among` those that are to be built or only beside them."""
+        study = self._studies[keyframe.id.robot]
+        beside = tuple(study.beside.values()) if among else ()
+        former = self._former(study, keyframe) if among else _own(study, keyframe)
+        return Sight(view_of(keyframe, keyframe.pose), self.pose(keyframe), among, beside, former)
+
+    def _former(self, study: _Study, keyframe: Keyframe) -> Surface | None:
+        """The keyframe's own surface, or that of the robot's last one carried over by the motion between them."""
+        outlook, own = study.outlook, _own(study, keyframe)
+        if outlook is None or own is not None:
+            return own
+        motion = relative(outlook.keyframe.pose, keyframe.pose)
+        return warped(outlook.surface, outlook.keyframe.camera, *motion, keyframe.camera, self._surface)
+
+    def _take(self, name: KeyframeId, settled: Settled, matched: Mapping[KeyframeId, int]) -> Keyframe | None:
+        study = self._studies.get(name.robot)
+        if study is None or settled.surface is None:
+            return None
+        keyframe, held = study.find(name), study.outlook
+        if keyframe is None or (held is not None and held.keyframe.arrived_ns > keyframe.arrived_ns):
+            return None
+        if keyframe is study.keyframe:
+            study.pose = settled.pose
+        beside = {other: len(said) for other, said in study.beside.items()} if keyframe is study.keyframe else {}
+        study.outlook = Outlook(keyframe, settled.pose, settled.surface, len(settled.points), {**beside, **matched})
+        return keyframe
+
+
+def view_of(keyframe: Keyframe, pose: Pose) -> View:
+    """What the maths needs of a keyframe, at this pose. Raises ValueError while it has no features."""
+    if keyframe.features is None:
+        raise ValueError(f"{keyframe.id} has no features yet")
+    return View(keyframe.camera, pose, keyframe.features)
+
+
+def masks(first: Outlook, second: Outlook, *, connected: bool) -> tuple[Mask, Mask]:
+    """Which cells (ROWS, COLUMNS) of either image the other camera sees."""
+    rotation, translation = relative(first.pose, second.pose)
+    one, other = (Seeing(outlook.keyframe.camera, outlook.surface) for outlook in (first, second))
+    options = VisibilityOptions()
+    return (
+        seen(one, other, rotation, translation, options, connected=connected),
+        seen(other, one, rotation.T, -rotation.T @ translation, options, connected=connected),
+    )
+
+
+def _own(study: _Study, keyframe: Keyframe) -> Surface | None:
+    outlook = study.outlook
+    return outlook.surface if outlook is not None and outlook.keyframe.id == keyframe.id else None
+
+
+def _matched(event: SurfacesBuilt) -> dict[int, dict[KeyframeId, int]]:
+    """For each keyframe of a job by index, those that it shares points with, and how many."""
+    matched: dict[int, dict[KeyframeId, int]] = {}
+    for (i, j), said in event.evidence.items():
+        if said.matched:
+            matched.setdefault(i, {})[event.job.keyframes[j]] = said.matched
+            matched.setdefault(j, {})[event.job.keyframes[i]] = said.matched
+    return matched
+
+
+def _depth_m(outlook: Outlook) -> float:
+    return 1.0 / float(np.median(outlook.surface.inverse_depth))
+
+
+def _partner(keyframe: Keyframe, earlier: deque[Keyframe], depth_m: float) -> Keyframe | None:
+    """The earlier keyframe whose place gives the best parallax, None if all are too near or too far."""
+    best: tuple[float, Keyframe] | None = None
+    for other in earlier:
+        baseline = float(np.linalg.norm(other.pose.centre_m - keyframe.pose.centre_m)) / depth_m
+        off = abs(np.log(max(baseline, _LEAST_BASELINE / 2) / _BEST_BASELINE))
+        if _LEAST_BASELINE <= baseline <= _MOST_BASELINE and (best is None or off < best[0]):
+            best = (off, other)
+    return None if best is None else best[1]
