@@ -25,6 +25,11 @@ class MethodName(StrEnum):
     PLANES = "planes"
     SURFACE = "surface"
     FRUSTUM = "frustum"
+    SNAVELY = "snavely"
+    BRUCKNER = "bruckner"
+    COSLAM = "coslam"
+    HULL = "hull"
+    DISTANCE = "distance"
 
 
 _DECIMALS = 3

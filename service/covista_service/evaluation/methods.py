@@ -8,15 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from covista_service.evaluation.case import Answer, Case, Pair
+from covista_service.evaluation import comparing
+from covista_service.evaluation.case import NO_CAMERA, NO_DEPTH, Answer, Case, Pair, connected
 from covista_service.perception import frustum
 from covista_service.perception.camera import Floats, View
 from covista_service.perception.scene import SceneOptions, reconstruct
 from covista_service.perception.survey import Outcome, Survey
 
 Method = Callable[[Case], dict[Pair, Answer]]
-NO_CAMERA = Answer("unknown", "no_camera")
-NO_DEPTH = Answer("unknown", "no_depth")
 
 
 def planes(case: Case) -> dict[Pair, Answer]:
@@ -30,7 +29,11 @@ def frustums(case: Case) -> dict[Pair, Answer]:
     if case.views is None:
         return dict.fromkeys(case.pairs, NO_CAMERA)
     depths = _median_depths(case)
-    return {(a, b): _frustum(case.views[a], depths.get(a), case.views[b], depths.get(b)) for a, b in case.pairs}
+    return {
+        # Depths come from the surveys, which is where the time goes.
+        (a, b): _frustum(case.views[a], depths.get(a), case.views[b], depths.get(b), case.surveys[a, b].ms)
+        for a, b in case.pairs
+    }
 
 
 def surfaces(case: Case) -> dict[Pair, Answer]:
@@ -45,7 +48,17 @@ def auto(case: Case) -> dict[Pair, Answer]:
     return dict.fromkeys(case.pairs, NO_CAMERA) if case.views is None else _surfaces(case.views, case.pairs)
 
 
-METHODS: Mapping[str, Method] = {"auto": auto, "planes": planes, "surface": surfaces, "frustum": frustums}
+METHODS: Mapping[str, Method] = {
+    "auto": auto,
+    "planes": planes,
+    "surface": surfaces,
+    "frustum": frustums,
+    "snavely": comparing.snavelys,
+    "bruckner": comparing.bruckners,
+    "coslam": comparing.coslams,
+    "hull": comparing.hulls,
+    "distance": comparing.distances,
+}
 
 
 def _surfaces(views: Sequence[View], pairs: Sequence[Pair]) -> dict[Pair, Answer]:
@@ -78,14 +91,16 @@ def _planes(found: Survey, ms: float) -> Answer:
     )
 
 
-def _frustum(first: View, first_depth: float | None, second: View, second_depth: float | None) -> Answer:
+def _frustum(
+    first: View, first_depth: float | None, second: View, second_depth: float | None, survey_ms: float
+) -> Answer:
     if first_depth is None or second_depth is None:
         return NO_DEPTH
     start = time.perf_counter_ns()
     overlap_a, overlap_b = frustum.overlap(
         first.camera, first.pose, first_depth, second.camera, second.pose, second_depth
     )
-    ms = (time.perf_counter_ns() - start) / 1e6
+    ms = survey_ms + (time.perf_counter_ns() - start) / 1e6
     return Answer("predicted", "predicted", overlap_a, overlap_b, ms=ms)
 
 
@@ -98,18 +113,8 @@ def _median_depths(case: Case) -> dict[int, float]:
             seen.setdefault(b, []).append(timed.survey.depths_second)
     own = {index: float(np.median(np.concatenate(depths))) for index, depths in seen.items()}
     medians = dict(own)
-    for connected in _connected(case.pairs):
-        known = [own[index] for index in connected if index in own]
+    for part in connected(case.pairs):
+        known = [own[index] for index in part if index in own]
         if known:
-            medians.update({index: float(np.median(known)) for index in connected if index not in own})
+            medians.update({index: float(np.median(known)) for index in part if index not in own})
     return medians
-
-
-def _connected(pairs: tuple[Pair, ...]) -> list[set[int]]:
-    """Sets of images that the pairs to compare connect."""
-    parts: list[set[int]] = []
-    for pair in pairs:
-        touched = [part for part in parts if not part.isdisjoint(pair)]
-        parts = [part for part in parts if part.isdisjoint(pair)]
-        parts.append(set(pair).union(*touched))
-    return parts

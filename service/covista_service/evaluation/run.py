@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Literal
 
 import numpy as np
@@ -12,16 +12,17 @@ from covista_schemas.messages import FeatureKind
 from numpy.typing import NDArray
 
 from covista_service.evaluation import methods
-from covista_service.evaluation.case import Answer, Pair, surveyed
+from covista_service.evaluation.case import Answer, Case, Pair, Surveys
 from covista_service.evaluation.datasets import Dataset, median_depth, picture
 from covista_service.evaluation.files import DATASET, DatasetError
 from covista_service.evaluation.metrics import Metrics, measure
 from covista_service.evaluation.noise import NO_NOISE, PoseNoise, disturbed
 from covista_service.perception.camera import Features, Floats, Pose, View
+from covista_service.perception.comparators.image import Image
 from covista_service.perception.survey import SurveyOptions
 
 Input = Literal["images", "features", "features+thumbnails"]
-_Extracted = tuple[Features, NDArray[np.uint8] | None]
+_Extracted = tuple[Image, NDArray[np.uint8] | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,25 +64,26 @@ class Evaluation:
 def evaluate(dataset: Dataset, options: RunOptions, advance: Callable[[], None] = lambda: None) -> Iterator[Evaluation]:
     """An evaluation for each seed and method; `advance` is called `steps` times on the way."""
     extracted = _extracted(dataset, options, advance)
+    images = tuple(image for image, _ in extracted)
     for seed in range(options.seeds):
         poses = _poses(dataset, options.noise, np.random.default_rng(seed))
-        case = surveyed(dataset.pairs, _views(dataset, poses, extracted), SurveyOptions(seed=seed), advance)
+        views = _views(dataset, poses, extracted)
+        surveys = Surveys(dataset.pairs, views, SurveyOptions(seed=seed), advance)
+        case = Case(dataset.pairs, views, surveys, images)
         for name in options.methods:
+            if not seed:
+                methods.METHODS[name](_first(case))  # so that what is compiled on first use is not timed
             answers = methods.METHODS[name](case)
-            yield Evaluation(
-                dataset.name,
-                name,
-                options.input,
-                options.noise,
-                seed,
-                tuple((dataset.frames[a].id, dataset.frames[b].id, answers[a, b]) for a, b in dataset.pairs),
-                judge(dataset.truth, answers),
-            )
+            advance()
+            yield _evaluation(dataset, options, seed, name, answers)
+        for _ in range(surveys.left):  # those that no method wanted
+            advance()
 
 
 def steps(dataset: Dataset, options: RunOptions) -> int:
-    """How often `evaluate` calls `advance`."""
-    return len(dataset.frames) + options.seeds * len(dataset.pairs) if _has_cameras(dataset) else 0
+    """How often `evaluate` calls `advance`: for an image, a pair surveyed or left alone, and a method that is done."""
+    surveyed = len(dataset.pairs) if _has_cameras(dataset) else 0
+    return len(dataset.frames) + options.seeds * (surveyed + len(options.methods))
 
 
 def judge(truth: Floats, answers: dict[Pair, Answer]) -> Metrics:
@@ -99,6 +101,20 @@ def judge(truth: Floats, answers: dict[Pair, Answer]) -> Metrics:
     return measure(actual, given, low, high, np.array([answer.ms for answer in answers.values()]))
 
 
+def _evaluation(
+    dataset: Dataset, options: RunOptions, seed: int, method: str, answers: dict[Pair, Answer]
+) -> Evaluation:
+    pairs = tuple((dataset.frames[a].id, dataset.frames[b].id, answers[a, b]) for a, b in dataset.pairs)
+    metrics = judge(dataset.truth, answers)
+    return Evaluation(dataset.name, method, options.input, options.noise, seed, pairs, metrics)
+
+
+def _first(case: Case) -> Case:
+    """The same question about the first pair alone."""
+    pairs = case.pairs[:1]
+    return replace(case, pairs=pairs, surveys=Surveys(pairs, case.views, SurveyOptions()))
+
+
 def _has_cameras(dataset: Dataset) -> bool:
     return all(frame.camera is not None and frame.pose is not None for frame in dataset.frames)
 
@@ -106,11 +122,12 @@ def _has_cameras(dataset: Dataset) -> bool:
 def _extracted(dataset: Dataset, options: RunOptions, advance: Callable[[], None]) -> list[_Extracted]:
     """Features, and the small grey picture that a rover would send with them: from images it can always be made."""
     extracted: list[_Extracted] = []
-    for frame in dataset.frames if _has_cameras(dataset) else ():
+    for frame in dataset.frames:
         image = picture(frame)
         found = features.extract(image, options.features)
         grey = None if options.input == "features" else _grey(features.thumbnail(image))
-        extracted.append((Features(str(found.kind), found.keypoints_px, found.descriptors), grey))
+        known = Features(str(found.kind), found.keypoints_px, found.descriptors)
+        extracted.append((Image(known, width=image.shape[1], height=image.shape[0]), grey))
         advance()
     return extracted
 
@@ -135,7 +152,8 @@ def _views(dataset: Dataset, poses: Sequence[Pose], extracted: Sequence[_Extract
     if not _has_cameras(dataset):
         return None
     return tuple(
-        View(camera, pose, found, grey) for camera, pose, (found, grey) in zip(cameras, poses, extracted, strict=True)
+        View(camera, pose, image.features, grey)
+        for camera, pose, (image, grey) in zip(cameras, poses, extracted, strict=True)
     )
 
 

@@ -31,6 +31,12 @@ def match(first: Features, second: Features, options: MatchingOptions) -> Indice
     return mutual(_hamming_distances(first.descriptors, second.descriptors), options.orb_ratio)
 
 
+def distances(first: Features, second: Features) -> Distances:
+    """How far descriptors of one kind are apart (n, n'): squared Euclidean for RootSIFT, bits that differ for ORB."""
+    measure = _squared_distances if first.kind == "rootsift" else _hamming_distances
+    return measure(first.descriptors, second.descriptors)
+
+
 def mutual(distances: Distances, ratio: float) -> Indices:
     """Pairs (k, 2) nearest to each other in `distances` (n, n'), below `ratio` times the second best of either.
 
