@@ -19,6 +19,9 @@ from scipy.sparse.csgraph import connected_components
 
 from covista_service.perception.camera import Camera, Floats
 
+# OpenCV's hull has its corners in single precision.
+_ON_EDGE_PX = 1e-3
+
 
 @dataclass(frozen=True, slots=True)
 class CoslamOptions:
@@ -66,8 +69,8 @@ def look(points: Floats, camera: Camera, features_px: Floats) -> Look:
     px = px[((px >= -0.5) & (px <= last)).all(axis=1)].astype(np.float32)
     if len(px) < 3:
         return Look(len(points), len(px), len(features_px), 0, 0.0)
-    hull = np.asarray(cv2.convexHull(px))
-    inside = sum(cv2.pointPolygonTest(hull, (x, y), measureDist=False) >= 0 for x, y in features_px.tolist())
+    hull = np.asarray(cv2.convexHull(px))[:, 0]
+    inside = int(_inside(hull.astype(np.float64), features_px).sum())
     return Look(len(points), len(px), len(features_px), inside, min(1.0, cv2.contourArea(hull) / camera.pixels))
 
 
@@ -110,3 +113,12 @@ def groups(
     joined = (shared_points >= options.shared_points) & (distance_m <= options.reach * initial_distance_m)
     _, labels = connected_components(coo_array(joined), directed=False)
     return np.asarray(labels, np.int64)
+
+
+def _inside(hull: Floats, points_px: Floats) -> NDArray[np.bool_]:
+    """Which points (m, 2) a convex polygon (k, 2) holds, whichever way round it runs: on one side of all edges."""
+    edges = np.roll(hull, -1, axis=0) - hull
+    edges /= np.maximum(np.linalg.norm(edges, axis=1, keepdims=True), _ON_EDGE_PX)
+    apart = points_px[:, None] - hull
+    side_px = edges[:, 0] * apart[:, :, 1] - edges[:, 1] * apart[:, :, 0]
+    return np.asarray((side_px >= -_ON_EDGE_PX).all(axis=1) | (side_px <= _ON_EDGE_PX).all(axis=1), np.bool_)
