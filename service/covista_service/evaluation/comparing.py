@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from covista_service.evaluation.case import NO_CAMERA, NO_DEPTH, Answer, Case, Pair, connected
+from covista_service.evaluation.case import NO_CAMERA, NO_DEPTH, Answer, Case, Pair, TimedSurvey, connected
 from covista_service.grouping.similarity import closeness
 from covista_service.perception.camera import Floats, View, relative, undistort
 from covista_service.perception.comparators import bruckner, coslam, hull, snavely
 from covista_service.perception.comparators.image import Image, image_of
+from covista_service.perception.epipolar import homogeneous
 
 KINDS_DIFFER = Answer("unknown", "kinds_differ")
 
@@ -49,8 +50,10 @@ def coslams(case: Case) -> dict[Pair, Answer]:
     """Features of an image inside the hull of what the other has mapped with all its pairs (Zou and Tan 2013)."""
     if case.views is None:
         return dict.fromkeys(case.pairs, NO_CAMERA)
-    maps = _maps(case)
-    return {pair: _coslam(case, pair, maps) for pair in case.pairs}
+    views, maps = case.views, _maps(case.views, case.surveys)
+    return {
+        (a, b): _coslam((views[a], views[b]), (maps.get(a), maps.get(b)), case.surveys[a, b]) for a, b in case.pairs
+    }
 
 
 def distances(case: Case) -> dict[Pair, Answer]:
@@ -84,36 +87,32 @@ def _by_image(first: Image, second: Image, said: Callable[[Image, Image], _Said]
     return Answer("image", "measured", overlap_a, overlap_b, inliers=inliers, ms=_ms(start))
 
 
-def _maps(case: Case) -> dict[int, Floats]:
+def _maps(views: Sequence[View], surveys: Mapping[Pair, TimedSurvey]) -> dict[int, Floats]:
     """Points (n, 3) of each image in its own frame, triangulated with all its pairs."""
     maps: dict[int, list[Floats]] = {}
-    for pair, timed in case.surveys.items():
+    for (a, b), timed in surveys.items():
         found = timed.survey
-        seen = ((found.points_first_px, found.depths_first), (found.points_second_px, found.depths_second))
-        for index, (points_px, depths) in zip(pair, seen, strict=True):
-            if len(points_px) and case.views:
-                maps.setdefault(index, []).append(_points(case.views[index], points_px, depths))
+        if len(found.points_first_px):
+            maps.setdefault(a, []).append(_points(views[a], found.points_first_px, found.depths_first))
+            maps.setdefault(b, []).append(_points(views[b], found.points_second_px, found.depths_second))
     return {index: np.concatenate(points) for index, points in maps.items()}
 
 
 def _points(view: View, points_px: Floats, depths: Floats) -> Floats:
-    points: Floats = depths[:, None] * (
-        np.column_stack((points_px, np.ones(len(depths)))) @ view.camera.rays_from_pixels.T
-    )
+    points: Floats = depths[:, None] * (homogeneous(points_px) @ view.camera.rays_from_pixels.T)
     return points
 
 
-def _coslam(case: Case, pair: Pair, maps: dict[int, Floats]) -> Answer:
-    a, b = pair
-    if case.views is None or a not in maps or b not in maps:
+def _coslam(views: tuple[View, View], maps: tuple[Floats | None, Floats | None], timed: TimedSurvey) -> Answer:
+    (first, second), (of_first, of_second) = views, maps
+    if of_first is None or of_second is None:
         return NO_DEPTH
     start = time.perf_counter_ns()
-    first, second = case.views[a], case.views[b]
-    overlap_a = coslam.share(_look(first, second, maps[b]))
-    overlap_b = coslam.share(_look(second, first, maps[a]))
-    # A map comes from the surveys, which is where the time goes.
-    ms = _ms(start) + case.surveys[pair].ms
-    return Answer("predicted", "predicted", overlap_a, overlap_b, inliers=case.surveys[pair].survey.inliers, ms=ms)
+    overlap_a = coslam.share(_look(first, second, of_second))
+    overlap_b = coslam.share(_look(second, first, of_first))
+    # Maps come from the surveys, which is where the time goes.
+    ms = timed.ms + _ms(start)
+    return Answer("predicted", "predicted", overlap_a, overlap_b, inliers=timed.survey.inliers, ms=ms)
 
 
 def _look(view: View, other: View, mapped: Floats) -> coslam.Look:
