@@ -80,7 +80,9 @@ def test_surfaces_are_built(workers: Workers, thumbnail: bytes | None) -> None:
     names, evidence = (job.first, job.second), {(0, 1): Evidence.of(found)}
     settled, said = workers.build(BuildSurfaces(names, sights, (thumbnail, None), evidence)).result(30)
     assert said[0, 1].matched > 50
-    one, other = (Outlook(keyframe(name), each.pose, each.surface, 50, {}) for name, each in zip(names, settled))
+    one, other = (
+        Outlook(keyframe(name), each.pose, each.surface, 50, {}) for name, each in zip(names, settled, strict=True)
+    )
     assert masks(one, other, connected=True)[0].mean() == pytest.approx(overlap(1.0), abs=0.05)
 
 
