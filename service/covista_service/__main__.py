@@ -13,6 +13,7 @@ from covista_schemas.errors import CovistaError, MissingExtraError
 from covista_service.bench.command import bench
 from covista_service.demo.command import demo
 from covista_service.evaluation.command import evaluate
+from covista_service.evaluation.paper.command import paper
 
 # The cores are shared out by the station's workers, and a picture's head may not claim what would not be decoded:
 # BLAS and OpenCV read this when they are first imported.
@@ -88,7 +89,7 @@ def _refuse(line: str, status: int) -> None:
     raise typer.Exit(status)
 
 
-for _command in (demo, evaluate, bench):
+for _command in (demo, evaluate, paper, bench):
     application.command()(_command)
 
 

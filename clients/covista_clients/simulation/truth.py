@@ -20,14 +20,21 @@ def overlap(world: World, camera_a: Camera, pose_a: Pose, camera_b: Camera, pose
 
     Every `step`-th pixel in both directions is asked. 0 where a sees no surface at all.
     """
+    met, seen = common(world, camera_a, pose_a, camera_b, pose_b, step)
+    return float(np.count_nonzero(seen) / np.count_nonzero(met)) if met.any() else 0.0
+
+
+def common(
+    world: World, camera_a: Camera, pose_a: Pose, camera_b: Camera, pose_b: Pose, step: int = STEP_PX
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which of a's `pixels` (n,) see a surface, and which of them see one that b sees too."""
     points = pixels(camera_a, step)
     inverse_depth, facet = cast(sight(world.facets, camera_a, pose_a), points)
     met = facet != NOTHING
-    if not met.any():
-        return 0.0
     surface_m = lifted(camera_a, pose_a, points[met], inverse_depth[met])
-    seen = _sees(world, camera_b, pose_b, surface_m, facet[met])
-    return float(np.count_nonzero(seen) / np.count_nonzero(met))
+    seen = np.zeros(len(points), bool)
+    seen[met] = _sees(world, camera_b, pose_b, surface_m, facet[met])
+    return met, seen
 
 
 def pixels(camera: Camera, step: int) -> Floats:

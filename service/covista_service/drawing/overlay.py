@@ -20,6 +20,7 @@ from covista_service.station.events import Keyframe
 _LEAST_WIDTH_PX = 640
 _MOST_PX = 2048
 _CAPTION_PX = 28
+_GAP_PX = 8
 _DIMMED = 0.35
 _NEUTRAL = 96
 
@@ -38,13 +39,41 @@ class CommonField:
     plane_of_point: tuple[int, ...] = ()
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Side:
+    """A keyframe of a pair, its common field (None where that is not known), and a caption (ASCII)."""
+
+    keyframe: Keyframe
+    common: CommonField | None
+    caption: str
+
+
 def overlay(keyframe: Keyframe, common: CommonField | None, caption: str) -> bytes:
     """PNG of the keyframe with the common field and a caption; None for a pair whose field is not known."""
-    scale = _scale(keyframe.camera)
-    ground = _ground(keyframe, scale)
-    if common is not None:
-        ground = _draw(ground, common, scale)
-    return canvas.png(_captioned(ground, caption))
+    return canvas.png(_drawn(Side(keyframe, common, caption)))
+
+
+def side_by_side(first: Side, second: Side) -> bytes:
+    """PNG of both keyframes of a pair, the same plane in the same colour."""
+    pictures = [_drawn(side) for side in (first, second)]
+    height = max(picture.shape[0] for picture in pictures)
+    gap: Picture = np.full((height, _GAP_PX, 3), canvas.PAPER, np.uint8)
+    left, right = (_lengthened(picture, height) for picture in pictures)
+    return canvas.png(np.hstack([left, gap, right]))
+
+
+def _drawn(side: Side) -> Picture:
+    scale = _scale(side.keyframe.camera)
+    ground = _ground(side.keyframe, scale)
+    if side.common is not None:
+        ground = _draw(ground, side.common, scale)
+    return _captioned(ground, side.caption)
+
+
+def _lengthened(picture: Picture, height: int) -> Picture:
+    paper: Picture = np.full((height, picture.shape[1], 3), canvas.PAPER, np.uint8)
+    paper[: picture.shape[0]] = picture
+    return paper
 
 
 def _scale(camera: Camera) -> float:

@@ -50,15 +50,18 @@ def evaluate(
         str, typer.Option(metavar="DEG,SHARE", help="Errors put on poses: degrees, share of the median depth.")
     ] = "0,0",
     seeds: Annotated[int, typer.Option(min=1, help="Repeat with this many seeds.")] = 1,
+    figures: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Where to put plots and overlays, as PNG.")
+    ] = None,
     format: Annotated[Literal["table", "json"], typer.Option(help="What to write to stdout.")] = "table",  # noqa: A002 - the flag's name
 ) -> None:
     """Compare ways to measure the common field of view on recordings whose overlap is known."""
     import json
 
+    from covista_schemas.errors import CovistaError
     from covista_schemas.messages import FeatureKind
     from rich.console import Console
 
-    from covista_service.evaluation.files import DatasetError
     from covista_service.evaluation.run import RunOptions
 
     options = RunOptions(
@@ -70,8 +73,8 @@ def evaluate(
     )
     console = Console(stderr=True)
     try:
-        evaluations = _run(folders, options, console)
-    except DatasetError as error:
+        evaluations = _run(folders, options, figures, console)
+    except CovistaError as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(1) from error
     if format == "json":
@@ -93,19 +96,28 @@ def _parse_noise(text: str) -> PoseNoise:
     return PoseNoise(deg, share)
 
 
-def _run(folders: list[Path], options: RunOptions, console: Console) -> list[Evaluation]:
+def _run(folders: list[Path], options: RunOptions, drawn: Path | None, console: Console) -> list[Evaluation]:
     from rich.progress import Progress
 
+    from covista_service.drawing.plots import need_matplotlib
+    from covista_service.evaluation import figures
     from covista_service.evaluation.datasets import load
     from covista_service.evaluation.run import evaluate as run
     from covista_service.evaluation.run import steps
 
+    if drawn is not None:
+        need_matplotlib()
     datasets = [load(folder) for folder in folders]
     evaluations: list[Evaluation] = []
     with Progress(console=console, transient=True) as progress:
         for dataset in datasets:
             task = progress.add_task(dataset.name, total=steps(dataset, options))
-            evaluations += run(dataset, options, partial(progress.advance, task))
+            found = list(run(dataset, options, partial(progress.advance, task)))
+            if drawn is not None:
+                figures.write_set(drawn, dataset, found)
+            evaluations += found
+    if drawn is not None:
+        figures.write_overview(drawn, evaluations)
     return evaluations
 
 

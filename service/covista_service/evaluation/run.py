@@ -38,7 +38,10 @@ class RunOptions:
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """Answers of one method to one set under one seed, pair by pair, and what they are worth."""
+    """Answers of one method to one set under one seed, pair by pair, and what they are worth.
+
+    `case` is the question that they answer.
+    """
 
     dataset: str
     method: str
@@ -47,6 +50,7 @@ class Evaluation:
     seed: int
     pairs: tuple[tuple[str, str, Answer], ...]
     metrics: Metrics
+    case: Case
 
     def as_json(self) -> dict[str, object]:
         """What `covista-station evaluate --format json` writes of it."""
@@ -75,7 +79,7 @@ def evaluate(dataset: Dataset, options: RunOptions, advance: Callable[[], None] 
                 methods.METHODS[name](_first(case))  # so that what is compiled on first use is not timed
             answers = methods.METHODS[name](case)
             advance()
-            yield _evaluation(dataset, options, seed, name, answers)
+            yield _evaluation(dataset, options, seed, name, answers, case)
         for _ in range(surveys.left):  # those that no method wanted
             advance()
 
@@ -102,11 +106,11 @@ def judge(truth: Floats, answers: dict[Pair, Answer]) -> Metrics:
 
 
 def _evaluation(
-    dataset: Dataset, options: RunOptions, seed: int, method: str, answers: dict[Pair, Answer]
+    dataset: Dataset, options: RunOptions, seed: int, method: str, answers: dict[Pair, Answer], case: Case
 ) -> Evaluation:
     pairs = tuple((dataset.frames[a].id, dataset.frames[b].id, answers[a, b]) for a, b in dataset.pairs)
     metrics = judge(dataset.truth, answers)
-    return Evaluation(dataset.name, method, options.input, options.noise, seed, pairs, metrics)
+    return Evaluation(dataset.name, method, options.input, options.noise, seed, pairs, metrics, case)
 
 
 def _first(case: Case) -> Case:

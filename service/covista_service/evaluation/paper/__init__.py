@@ -1,0 +1,1 @@
+"""The paper's tables and figures, rebuilt and compared with what it prints: `covista-station paper`."""
