@@ -97,6 +97,9 @@ def main() -> None:
     """Run the command line; an absent optional package is one line that says what to install."""
     try:
         application()
+    except MissingExtraError as error:
+        print(error, file=sys.stderr)
+        sys.exit(EXIT_REFUSED)
     except ImportError as error:
         package = (error.name or "").partition(".")[0]
         if package.startswith("covista") or not package:

@@ -123,7 +123,8 @@ def tinted(material: Material, bgr: tuple[float, float, float]) -> Material:
 
     def coloured(rng: np.random.Generator, height_px: int, width_px: int, texels_per_m: float, tone: float) -> Picture:
         plain = material(rng, height_px, width_px, texels_per_m, tone)
-        return np.asarray(cv2.multiply(plain, (*bgr, 1.0)), np.uint8)
+        light = np.array((*bgr, 1.0))
+        return np.asarray(cv2.multiply(plain, light), np.uint8)
 
     return coloured
 

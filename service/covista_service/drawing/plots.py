@@ -28,6 +28,7 @@ _COLUMNS = 4
 _PANEL_IN = 3.1
 _BAR_IN = 0.4
 _LETTERS_PER_BAR = 5
+_ROW_IN = 0.27
 _DPI = 110
 _STYLE = {
     "font.size": 10,
@@ -100,8 +101,9 @@ def bars(groups: Sequence[str], series: Mapping[str, Sequence[float | None]], ti
             labels = ["-" if value is None else f"{value:.3f}".lstrip("0") for value in values]
             axes.bar_label(drawn, labels, fontsize=8, padding=1)
         crowded = max(map(len, groups)) > _LETTERS_PER_BAR * (len(series) + 1)
-        slant = {"rotation": 25, "ha": "right", "rotation_mode": "anchor"} if crowded else {}
-        axes.set_xticks(np.arange(len(groups)), groups, **slant)
+        axes.set_xticks(np.arange(len(groups)), groups)
+        if crowded:
+            axes.tick_params("x", labelrotation=20)
         axes.grid(visible=False, axis="x")
         axes.margins(y=0.15)
         axes.set_ylabel(y_label)
@@ -137,49 +139,49 @@ def boxes(series: Mapping[str, Floats], title: str, y_label: str) -> bytes:
 
 
 def curves(panels: Mapping[str, Sequence[Curve]], title: str, x_label: str, y_label: str) -> bytes:
-    """Panels, by title, of curves over a logarithmic x; the legend is of the first panel, and holds for all."""
+    """Panels, by title, of curves over a logarithmic x, y from 0 to 1; one legend, that of the first panel, for all."""
     with _styled():
         figure = _figure(_PANEL_IN * len(panels) + 0.6, _PANEL_IN + 1.0)
         grid = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
         for axes, (name, drawn) in zip(grid, panels.items(), strict=True):
             for k, curve in enumerate(drawn):
+                # Earlier ones are wider, so that those which coincide are all seen.
+                width = 1.6 + 1.2 * (len(drawn) - 1 - k)
                 style = _DASHES[k % len(_DASHES)]
-                axes.plot(curve.x, curve.y, style, color=COLOURS[k % len(COLOURS)], lw=2, label=curve.label)
-            axes.set_xscale("log")
-            axes.set_ylim(-0.02, 1.02)
-            axes.set_title(name)
+                axes.plot(curve.x, curve.y, style, color=COLOURS[k % len(COLOURS)], lw=width, label=curve.label)
+            axes.set(xscale="log", ylim=(-0.02, 1.02), title=name, xlabel=x_label)
         grid[0].set_ylabel(y_label)
         figure.suptitle(title)
-        figure.supxlabel(x_label, fontsize=10)
         handles, labels = grid[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=2)
+        figure.legend(handles, labels, loc="outside lower center", ncols=2, handlelength=3.5)
         return _png(figure)
 
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> bytes:
-    """A table with a head; every column is as wide as its longest text."""
-    lengths = [max(len(line) for text in column for line in text.split("\n")) for column in zip(columns, *rows)]
-    lines = 1 + max((text.count("\n") for text in columns), default=0)
+    """A table with a head, whose texts may have more than one line; every column is as wide as its longest line."""
+    longest = [
+        max(len(line) for text in column for line in text.split("\n")) for column in zip(columns, *rows, strict=True)
+    ]
+    widths = np.array(longest) + 3.0
+    head = max(text.count("\n") for text in columns) + 1
     with _styled():
-        figure = _figure(0.5 + 0.095 * sum(length + 3 for length in lengths), 0.8 + 0.3 * (len(rows) + lines))
+        figure = _figure(0.5 + 0.095 * widths.sum(), 0.45 + _ROW_IN * (len(rows) + head))
         axes = figure.subplots()
         axes.set_axis_off()
         axes.set_title(title, loc="left", fontsize=11)
         drawn = axes.table(
             [list(row) for row in rows],
             colLabels=list(columns),
-            colWidths=[(length + 3) / sum(length + 3 for length in lengths) for length in lengths],
+            colWidths=(widths / widths.sum()).tolist(),
             cellLoc="left",
-            loc="center",
             bbox=(0.0, 0.0, 1.0, 1.0),
         )
         drawn.auto_set_font_size(False)
         drawn.set_fontsize(10)
         for (row, _), cell in drawn.get_celld().items():
-            cell.set(edgecolor="#d0d0d0", facecolor="#eef2f6" if row == 0 else "white")
-            if row == 0:
-                cell.set_height(cell.get_height() * lines)
-                cell.get_text().set_fontweight("bold")
+            cell.set(edgecolor="#d0d0d0", facecolor="white" if row else "#eef2f6")
+            cell.set_height((1 if row else head) / (len(rows) + head))
+            cell.get_text().set_fontweight("normal" if row else "bold")
         return _png(figure)
 
 
@@ -195,7 +197,7 @@ def _styled() -> AbstractContextManager[None]:
     need_matplotlib()
     from matplotlib import rc_context
 
-    return rc_context(_STYLE)
+    return rc_context(_STYLE)  # type: ignore[arg-type]  # its keys are literal types from 3.11 on, strings before
 
 
 def _figure(width_in: float, height_in: float) -> Figure:

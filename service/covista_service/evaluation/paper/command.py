@@ -48,9 +48,7 @@ def _table(items: list[Item]) -> Table:
         table.add_column(title, justify="right")
     table.add_column("agrees")
     for item in items:
-        table.add_row(
-            item.item, item.case, _figure(item.printed), _figure(item.ours), "yes" if item.agrees else "no"
-        )
+        table.add_row(item.item, item.case, _figure(item.printed), _figure(item.ours), "yes" if item.agrees else "no")
     return table
 
 

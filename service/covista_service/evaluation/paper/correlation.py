@@ -31,6 +31,8 @@ RIVALS: tuple[str, ...] = ("snavely", "bruckner", "coslam", "hull", "distance")
 CAMERA = pinhole(320, 240)
 _VIEWS = 6
 _SURFACES_CLEAR = 0.03
+# True overlap from which on a pair counts as overlapping.
+_OVERLAPS = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +41,20 @@ class Correlation:
 
     pearson: float
     spearman: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sample:
+    """Pairs of one kind: their true overlaps (n,), and what each measure says of them (n,)."""
+
+    kind: str
+    true: Floats
+    given: Mapping[str, Floats]
+
+    @property
+    def correlations(self) -> dict[str, Correlation]:
+        """Of every measure."""
+        return {name: _correlated(self.true, values) for name, values in self.given.items()}
 
 
 def correlation(tell: Tell, chosen: Sequence[tuple[str, int]] = WORLDS) -> Chapter:
@@ -55,9 +71,15 @@ def correlation(tell: Tell, chosen: Sequence[tuple[str, int]] = WORLDS) -> Chapt
             said[name] += [_similarity(answers[pair]) for pair in overlaps]
     known = np.array(true)
     given = {name: np.array(values) for name, values in said.items()}
-    found = {name: _correlated(known, values) for name, values in given.items()}
-    drawn = {"correlation.png": _plot(known, given, found), "correlation_table.png": _table(found, len(known))}
-    return Chapter(tuple(_items(found)), drawn)
+    overlapping = known >= _OVERLAPS
+    every = Sample("all pairs", known, given)
+    sharing = Sample(
+        f"overlap >= {_OVERLAPS:g}",
+        known[overlapping],
+        {name: values[overlapping] for name, values in given.items()},
+    )
+    drawn = {"correlation.png": _plot(every), "correlation_table.png": _table((every, sharing))}
+    return Chapter(tuple(item for sample in (every, sharing) for item in _items(sample)), drawn)
 
 
 def _pairs(name: str, seed: int) -> tuple[dict[Pair, float], Case]:
@@ -83,31 +105,41 @@ def _correlated(true: Floats, given: Floats) -> Correlation:
     return Correlation(float(stats.pearsonr(true, given).statistic), float(stats.spearmanr(true, given).statistic))
 
 
-def _items(found: Mapping[str, Correlation]) -> list[Item]:
+def _items(sample: Sample) -> list[Item]:
+    found = sample.correlations
     items = []
     for kind in ("pearson", "spearman"):
         r = {name: round(float(getattr(each, kind)), 3) for name, each in found.items()}
-        title, planes = kind.capitalize(), r["planes"]
+        what, planes = f"{kind.capitalize()}, {sample.kind}", r["planes"]
         items += [
-            Item(NAME, f"{title}: {name} below planes ({planes:.3f})", None, r[name], r[name] < planes)
+            Item(NAME, f"{what}: {name} below planes ({planes:.3f})", None, r[name], r[name] < planes)
             for name in RIVALS
             if name in r
         ]
         best = max(r.values())
-        law = f"{title}: auto not below any other by more than {_SURFACES_CLEAR:g} (best {best:.3f})"
+        law = f"{what}: auto not below any other by more than {_SURFACES_CLEAR:g} (best {best:.3f})"
         items.append(Item(NAME, law, None, r["auto"], r["auto"] >= best - _SURFACES_CLEAR))
     return items
 
 
-def _plot(true: Floats, given: Mapping[str, Floats], found: Mapping[str, Correlation]) -> bytes:
+def _plot(sample: Sample) -> bytes:
+    found = sample.correlations
     panels = [
-        plots.Panel(f"{name}: r = {found[name].pearson:.2f}, rank {found[name].spearman:.2f}", true, values)
-        for name, values in given.items()
+        plots.Panel(f"{name}: r = {found[name].pearson:.2f}, rank {found[name].spearman:.2f}", sample.true, values)
+        for name, values in sample.given.items()
     ]
-    title = f"Measures of {len(true)} pairs of rendered views against their true overlap"
+    title = f"Measures of {len(sample.true)} pairs of rendered views against their true overlap"
     return plots.scatters(panels, title, "true overlap, mean of both directions", "as measured")
 
 
-def _table(found: Mapping[str, Correlation], pairs: int) -> bytes:
-    rows = [(name, f"{each.pearson:.3f}", f"{each.spearman:.3f}") for name, each in found.items()]
-    return plots.table(f"{NAME}, {pairs} pairs", ("measure", "Pearson's r", "Spearman's"), rows)
+def _table(samples: Sequence[Sample]) -> bytes:
+    found = [sample.correlations for sample in samples]
+    rows = [
+        (name, *(f"{r:.3f}" for each in found for r in (each[name].pearson, each[name].spearman))) for name in found[0]
+    ]
+    heads = [
+        f"{coefficient},\n{sample.kind} ({len(sample.true)})"
+        for sample in samples
+        for coefficient in ("Pearson", "Spearman")
+    ]
+    return plots.table(NAME, ("measure", *heads), rows)
