@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from covista_schemas import features, messages
 from numpy.typing import NDArray
 
+from covista_service.evaluation.case import Case, Pair, surveyed
 from covista_service.perception.camera import Camera, Features, Pose, View, rotation_of
+from covista_service.perception.survey import SurveyOptions
 
 
 def view_of(camera: messages.Camera, pose: messages.Pose, image: NDArray[np.uint8]) -> View:
@@ -19,6 +23,11 @@ def view_of(camera: messages.Camera, pose: messages.Pose, image: NDArray[np.uint
         Features(str(found.kind), found.keypoints_px, found.descriptors),
         np.ascontiguousarray(grey),
     )
+
+
+def case_of(views: Sequence[View], pairs: Sequence[Pair]) -> Case:
+    """The question to the methods what pairs of rendered views have in common."""
+    return surveyed(pairs, tuple(views), SurveyOptions())
 
 
 def camera_of(camera: messages.Camera) -> Camera:

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from covista_service.drawing import canvas, plots
 from covista_service.evaluation import methods, pictures
-from covista_service.evaluation.case import surveyed
 from covista_service.evaluation.paper.chapter import Chapter, Item, Tell
 from covista_service.evaluation.paper.likeness import CAMERA, TABLE_1, Likeness, likeness, strongest
+from covista_service.evaluation.rendered import case_of
 from covista_service.perception.camera import Floats
 from covista_service.perception.survey import Outcome, Survey, SurveyOptions, survey
 
@@ -50,20 +50,19 @@ def common_field(tell: Tell, names: Sequence[str] = tuple(TABLE_1)) -> Chapter:
 
 
 def _row(scene: Likeness) -> Row:
-    options = SurveyOptions()
-    few = _with_inliers(scene, TABLE_1[scene.name].inliers, options)
-    case = surveyed([(0, 1)], scene.views, options)
+    few = _with_inliers(scene, TABLE_1[scene.name].inliers)
+    case = case_of(scene.views, [(0, 1)])
     surface = methods.METHODS["auto"](case)[0, 1].overlap_a
     return Row(scene, few, case.surveys[0, 1].survey, surface)
 
 
-def _with_inliers(scene: Likeness, wanted: int, options: SurveyOptions) -> Survey:
+def _with_inliers(scene: Likeness, wanted: int) -> Survey:
     """What as few of each image's strongest features say as leave `wanted` inlier points."""
     most = max(len(view.features.keypoints_px) for view in scene.views)
     found = Survey(Outcome.FEW_MATCHES)
     for count in range(max(wanted, _FEWEST), most + 1):
         one, other = (strongest(view, count) for view in scene.views)
-        found = survey(one, other, options)
+        found = survey(one, other, SurveyOptions())
         if found.outcome is Outcome.MEASURED and found.inliers >= wanted:
             return found
     return found

@@ -16,12 +16,11 @@ from covista_clients.simulation.viewing import pinhole
 from scipy import stats
 
 from covista_service.drawing import plots
-from covista_service.evaluation.case import Answer, Case, Pair, surveyed
+from covista_service.evaluation.case import Answer, Case, Pair
 from covista_service.evaluation.methods import METHODS
 from covista_service.evaluation.paper.chapter import Chapter, Item, Tell
-from covista_service.evaluation.rendered import view_of
+from covista_service.evaluation.rendered import case_of, view_of
 from covista_service.perception.camera import Floats
-from covista_service.perception.survey import SurveyOptions
 
 NAME = "Correlation with the true overlap"
 WORLDS: tuple[tuple[str, int], ...] = tuple((name, seed) for seed in (0, 1) for name in worlds.WORLDS)
@@ -86,12 +85,12 @@ def _pairs(name: str, seed: int) -> tuple[dict[Pair, float], Case]:
     """Mean true overlap of both directions (Eq. 16) by pair of views, and the case."""
     world = worlds.build(name, seed)
     poses = worlds.viewpoints(world, _VIEWS, seed)
-    views = tuple(view_of(CAMERA, pose, render(world, CAMERA, pose).image) for pose in poses)
+    views = [view_of(CAMERA, pose, render(world, CAMERA, pose).image) for pose in poses]
     overlaps = {
         (a, b): sum(truth.overlap(world, CAMERA, poses[i], CAMERA, poses[j]) for i, j in ((a, b), (b, a))) / 2
         for a, b in combinations(range(_VIEWS), 2)
     }
-    return overlaps, surveyed(tuple(overlaps), views, SurveyOptions())
+    return overlaps, case_of(views, tuple(overlaps))
 
 
 def _similarity(answer: Answer) -> float:
