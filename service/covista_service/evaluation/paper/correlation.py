@@ -124,7 +124,7 @@ def _items(sample: Sample) -> list[Item]:
 def _plot(sample: Sample) -> bytes:
     found = sample.correlations
     panels = [
-        plots.Panel(f"{name}: r = {found[name].pearson:.2f}, rank {found[name].spearman:.2f}", sample.true, values)
+        plots.Panel(f"{name}: r = {found[name].pearson:.3f}, rank {found[name].spearman:.3f}", sample.true, values)
         for name, values in sample.given.items()
     ]
     title = f"Measures of {len(sample.true)} pairs of rendered views against their true overlap"
