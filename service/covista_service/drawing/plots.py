@@ -162,6 +162,9 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
     longest = [
         max(len(line) for text in column for line in text.split("\n")) for column in zip(columns, *rows, strict=True)
     ]
+    need_matplotlib()
+    from matplotlib.transforms import Bbox
+
     widths = np.array(longest) + 3.0
     head = max(text.count("\n") for text in columns) + 1
     with _styled():
@@ -174,7 +177,7 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
             colLabels=list(columns),
             colWidths=(widths / widths.sum()).tolist(),
             cellLoc="left",
-            bbox=(0.0, 0.0, 1.0, 1.0),
+            bbox=Bbox.unit(),
         )
         drawn.auto_set_font_size(False)
         drawn.set_fontsize(10)
