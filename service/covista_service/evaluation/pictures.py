@@ -22,9 +22,9 @@ def pair(views: tuple[View, View], images: tuple[bytes, bytes], found: Survey, c
 def common_field(found: Survey, *, first: bool) -> CommonField:
     """What a survey found, in the first or the second image."""
     return CommonField(
-        tuple(plane.region_first if first else plane.region_second for plane in found.planes),
-        found.points_first_px if first else found.points_second_px,
-        tuple(np.asarray(found.plane_of_point).tolist()),
+        polygons_px=tuple(plane.region_first if first else plane.region_second for plane in found.planes),
+        points_px=found.points_first_px if first else found.points_second_px,
+        plane_of_point=tuple(np.asarray(found.plane_of_point).tolist()),
     )
 
 

@@ -8,8 +8,9 @@ import numpy as np
 from covista_schemas import features, messages
 from numpy.typing import NDArray
 
-from covista_service.evaluation.case import Case, Pair, surveyed
+from covista_service.evaluation.case import Case, Pair, Surveys
 from covista_service.perception.camera import Camera, Features, Pose, View, rotation_of
+from covista_service.perception.comparators.image import image_of
 from covista_service.perception.survey import SurveyOptions
 
 
@@ -27,7 +28,8 @@ def view_of(camera: messages.Camera, pose: messages.Pose, image: NDArray[np.uint
 
 def case_of(views: Sequence[View], pairs: Sequence[Pair]) -> Case:
     """The question to the methods what pairs of rendered views have in common."""
-    return surveyed(pairs, tuple(views), SurveyOptions())
+    surveys = Surveys(pairs, views, SurveyOptions())
+    return Case(tuple(pairs), tuple(views), surveys, tuple(image_of(view) for view in views))
 
 
 def camera_of(camera: messages.Camera) -> Camera:
