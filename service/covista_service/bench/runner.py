@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import chain
 
-from covista_service.bench import latency, survey
+from covista_service.bench import dense, latency, survey
 from covista_service.bench.row import Row
 
 Bench = Callable[[bool], Iterator[Row]]
-BENCHES: Mapping[str, Bench] = {"survey": survey.rows, "latency": latency.rows}
+
+
+def together(*benches: Bench) -> Bench:
+    """One bench of several, one after the other."""
+    return lambda long: chain.from_iterable(bench(long) for bench in benches)
+
+
+BENCHES: Mapping[str, Bench] = {"survey": together(survey.rows, dense.rows), "latency": latency.rows}
 
 
 class UnknownBenchError(ValueError):

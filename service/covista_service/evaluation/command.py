@@ -30,6 +30,8 @@ class MethodName(StrEnum):
     COSLAM = "coslam"
     HULL = "hull"
     DISTANCE = "distance"
+    DENSE = "dense"
+    DENSE_AT_JUMPS = "dense_at_jumps"
 
 
 _DECIMALS = 3

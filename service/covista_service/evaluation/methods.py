@@ -10,6 +10,7 @@ import numpy as np
 
 from covista_service.evaluation import comparing
 from covista_service.evaluation.case import NO_CAMERA, NO_DEPTH, Answer, Case, Pair, connected
+from covista_service.evaluation.dense_method import dense, dense_at_jumps
 from covista_service.perception import frustum
 from covista_service.perception.camera import Floats, View
 from covista_service.perception.scene import SceneOptions, reconstruct
@@ -58,6 +59,8 @@ METHODS: Mapping[str, Method] = {
     "coslam": comparing.coslams,
     "hull": comparing.hulls,
     "distance": comparing.distances,
+    "dense": dense,
+    "dense_at_jumps": dense_at_jumps,
 }
 
 

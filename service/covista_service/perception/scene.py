@@ -109,6 +109,16 @@ class Scene:
         """Surfaces, None where nothing is known."""
         return tuple(one.surface for one in self.settled)
 
+    @property
+    def points(self) -> tuple[DepthPoints, ...]:
+        """What the pairs of each keyframe agree on."""
+        return tuple(one.points for one in self.settled)
+
+    def with_surfaces(self, surfaces: Sequence[Surface | None]) -> Scene:
+        """The same keyframes with other surfaces."""
+        settled = [replace(one, surface=surface) for one, surface in zip(self.settled, surfaces, strict=True)]
+        return replace(self, settled=tuple(settled))
+
     def overlap(self, i: int, j: int) -> tuple[float, float] | None:
         """q_i and q_j of Eq. 16, None where a surface is missing."""
         one, other = self.surfaces[i], self.surfaces[j]

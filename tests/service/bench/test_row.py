@@ -43,6 +43,13 @@ def test_a_name_that_nothing_has_is_refused(name: str) -> None:
         list(runner.run((name,), long=False))
 
 
+def test_one_bench_may_be_of_several_parts() -> None:
+    both = runner.together(
+        lambda long: iter([row("survey", "cold_500")]), lambda long: iter([row("survey", "dense" if long else "short")])
+    )
+    assert [each.case for each in both(True)] == ["cold_500", "dense"]
+
+
 def test_calls_take_turns_after_a_round_that_does_not_count() -> None:
     calls: list[str] = []
     times = alternately_ms([lambda: calls.append("a"), lambda: calls.append("b")], rounds=3)

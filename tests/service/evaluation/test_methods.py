@@ -53,3 +53,9 @@ def test_every_pair_gets_a_named_outcome_without_cameras(name: str) -> None:
     answers = METHODS[name](Case(((0, 1), (1, 2)), None, {}))
     assert [answer.outcome for answer in answers.values()] == ["no_camera", "no_camera"]
     assert all(answer.overlap_a is None and answer.found_by == "unknown" for answer in answers.values())
+
+
+@pytest.mark.parametrize("name", ["auto", "surface", "dense", "dense_at_jumps"])
+def test_without_a_match_surfaces_say_so(name: str) -> None:
+    answers = METHODS[name](Case(((0, 1),), (view(0), view(1)), {}))
+    assert (answers[0, 1].found_by, answers[0, 1].outcome, answers[0, 1].overlap_a) == ("unknown", "no_depth", None)
