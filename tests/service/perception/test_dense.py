@@ -6,7 +6,7 @@ import pytest
 from covista_service.perception.camera import Floats, Pose
 from covista_service.perception.dense import DenseOptions, densified
 from covista_service.perception.jumps import JumpOptions, mixed
-from covista_service.perception.scene import Scene
+from covista_service.perception.scene import Scene, Settled
 from covista_service.perception.surface import Surface
 
 from tests.service.perception.scenes import turn
@@ -108,8 +108,10 @@ def test_few_points_give_no_range_to_sweep(points: int) -> None:
 
 def test_one_depth_for_all_points_is_no_error() -> None:
     known = scene(SLANTED, POSES)
-    same = tuple(replace(one, inverse_depths=np.full(len(one), 0.2)) for one in known.points)
-    assert all(one is not None for one in overlaps(densified(replace(known, points=same), OPTIONS)))
+    same = [
+        replace(one, points=replace(one.points, inverse_depths=np.full(len(one.points), 0.2))) for one in known.settled
+    ]
+    assert all(one is not None for one in overlaps(densified(replace(known, settled=tuple(same)), OPTIONS)))
 
 
 def test_pictures_of_something_else_change_nothing() -> None:
@@ -121,11 +123,7 @@ def test_pictures_of_something_else_change_nothing() -> None:
 def test_robots_in_one_place_see_the_same() -> None:
     poses = [POSES[0], POSES[0], POSES[2]]
     known = scene(STEP, poses)
-    known = replace(
-        known,
-        points=(known.points[0], known.points[0], known.points[2]),
-        surfaces=(known.surfaces[0], known.surfaces[0], known.surfaces[2]),
-    )
+    known = replace(known, settled=(known.settled[0], known.settled[0], known.settled[2]))
     dense = densified(known, OPTIONS)
     assert dense.surfaces[0] is not known.surfaces[0]
     assert dense.overlap(0, 1) == (1.0, 1.0)
@@ -136,16 +134,19 @@ def test_robots_in_one_place_alone_have_nothing_to_sweep() -> None:
     assert densified(known, OPTIONS).surfaces == known.surfaces
 
 
+def scaled_by(scale: float, one: Settled) -> Settled:
+    points, surface = one.points, one.surface
+    assert surface is not None
+    return Settled(
+        Pose(one.pose.world_from_camera, scale * one.pose.centre_m),
+        Surface(surface.inverse_depth / scale, surface.sigma),
+        replace(points, inverse_depths=points.inverse_depths / scale, sigmas=points.sigmas / scale),
+    )
+
+
 @pytest.mark.parametrize("scale", [0.1, 10.0])
 def test_scaling_all_baselines_changes_next_to_nothing(scale: float) -> None:
     known = scene(STEP, POSES)
-    scaled = replace(
-        known,
-        poses=tuple(Pose(one.world_from_camera, scale * one.centre_m) for one in known.poses),
-        points=tuple(
-            replace(one, inverse_depths=one.inverse_depths / scale, sigmas=one.sigmas / scale) for one in known.points
-        ),
-        surfaces=tuple(Surface(one.inverse_depth / scale, one.sigma) for one in known.surfaces if one is not None),
-    )
+    scaled = replace(known, settled=tuple(scaled_by(scale, one) for one in known.settled))
     one, other = (overlaps(densified(of, OPTIONS)) for of in (known, scaled))
     assert np.array(one, float) == pytest.approx(np.array(other, float), abs=2e-3)
