@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from covista_service.perception.camera import Features
 from covista_service.perception.comparison import Comparison, compare
 from covista_service.perception.scene import Evidence, SceneOptions, Settled, Sight, settle
+from covista_service.perception.warming import warm_up
 from covista_service.station.events import BuildSurfaces, Keyframe, SurveyPair
 
 # A robot that shot while tilted says so in its pose, not by an orientation tag in the file.
@@ -53,9 +54,10 @@ class Workers:
         self._options = options
         self._lock = threading.Lock()
         self._pool = _pool(options)
-        # Processes take a second or two to start: now is better than when the first robot waits.
-        for _ in range(options.count):
-            self._submit(_use_one_core)
+        # Processes take a second or two to start, and compiled code to load: now is better than when the first robot
+        # waits. Threads share what one of them has loaded.
+        for _ in range(1 if options.kind == "threads" else options.count):
+            self._submit(warm_up)
 
     @property
     def capacity(self) -> int:
@@ -152,12 +154,13 @@ def _use_one_core() -> None:
 
 
 def _enter_process() -> None:
-    """Leave Ctrl-C to the station, and end with it even when it is killed."""
+    """Leave Ctrl-C to the station, end with it even when it is killed, and be ready when the first job comes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _use_one_core()
     station = parent_process()
     if station is not None:
         threading.Thread(target=_follow, args=(station.join,), daemon=True).start()
+    warm_up()
 
 
 def _follow(wait: Callable[[], None]) -> None:

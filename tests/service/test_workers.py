@@ -17,6 +17,7 @@ from covista_service.link.translate import events_of
 from covista_service.perception.camera import View
 from covista_service.perception.comparison import Outcome
 from covista_service.perception.scene import Evidence, Sight
+from covista_service.perception.warming import warm_up
 from covista_service.station.events import BuildSurfaces, Keyframe, KeyframeArrived, KeyframeId, SurveyPair
 from covista_service.station.outlooks import Outlook, masks
 from covista_service.workers import Workers, WorkersOptions, extract
@@ -109,6 +110,12 @@ def test_grey_pictures_do_as_well() -> None:
 def test_a_keyframe_without_a_picture_is_a_mistake_of_ours(workers: Workers) -> None:
     with pytest.raises(ValueError, match="nothing to extract"):
         workers.extract(arrived(keyframe_bytes("r1"), "r1"))
+
+
+def test_workers_are_warm_before_their_first_job(workers: Workers) -> None:
+    # Said in words, for neither this test nor what a cache says of itself can be sent to a process.
+    asked = f"__import__({warm_up.__module__!r}, fromlist='*').warm_up.cache_info().currsize"
+    assert workers._submit(eval, asked).result(30) == 1
 
 
 def test_a_pool_whose_process_died_is_replaced() -> None:

@@ -12,7 +12,7 @@ from covista_service.answers.robots import find_robot, keyframe_id
 from covista_service.answers.unknown import NotKnownError
 from covista_service.perception.camera import Camera, Floats, Pose
 from covista_service.perception.comparison import Comparison
-from covista_service.perception.regions import polygons
+from covista_service.perception.regions import RegionOptions, regions
 from covista_service.perception.survey import Outcome, Plane, Survey, SurveyOptions, explain
 from covista_service.station.events import Keyframe
 from covista_service.station.outlooks import masks
@@ -81,7 +81,10 @@ def common_regions(view: PairView) -> tuple[list[Floats], list[Floats]]:
         return [], []
     seen = masks(*view.outlooks, connected=view.connected)
     cameras = [outlook.keyframe.camera for outlook in view.outlooks]
-    in_a, in_b = (polygons(mask, camera) for mask, camera in zip(seen, cameras, strict=True))
+    in_a, in_b = (
+        [np.array(region) for region in regions(mask, camera, RegionOptions())]
+        for mask, camera in zip(seen, cameras, strict=True)
+    )
     return in_a, in_b
 
 

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import chain
 
-from covista_service.bench import dense, latency, survey
+from covista_service.bench import dense, latency, predict_surfaces, surface, survey
 from covista_service.bench.row import Row
 
 Bench = Callable[[bool], Iterator[Row]]
-
-
-def together(*benches: Bench) -> Bench:
-    """One bench of several, one after the other."""
-    return lambda long: chain.from_iterable(bench(long) for bench in benches)
-
-
-BENCHES: Mapping[str, Bench] = {"survey": together(survey.rows, dense.rows), "latency": latency.rows}
+# What makes up each of them, in order.
+BENCHES: Mapping[str, Sequence[Bench]] = {
+    "survey": (survey.rows, surface.rows, dense.rows),
+    "predict": (predict_surfaces.rows,),
+    "latency": (latency.rows,),
+}
 
 
 class UnknownBenchError(ValueError):
@@ -26,15 +24,20 @@ class UnknownBenchError(ValueError):
 def run(names: Sequence[str], long: bool) -> Iterator[Row]:
     """Rows of the benchmarks named, of all without a name; a name is `bench` or `bench/case`.
 
-    Raises UnknownBenchError: for a bench before anything runs, for a case when its bench is through.
+    A bench ends when all cases asked for are there. Raises UnknownBenchError: for a bench before anything runs, for a
+    case when its bench is through.
     """
     asked = {name: set[str]() for name in BENCHES} if not names else _by_bench(names)
     for bench, cases in asked.items():
-        found = [row for row in BENCHES[bench](long) if not cases or row.case in cases]
-        absent = cases - {row.case for row in found}
+        absent = set(cases)
+        for row in chain.from_iterable(part(long) for part in BENCHES[bench]):
+            if not cases or row.case in absent:
+                yield row
+            absent.discard(row.case)
+            if cases and not absent:
+                break
         if absent:
             raise UnknownBenchError(f"benchmark {bench} has no case {min(absent)!r}")
-        yield from found
 
 
 def _by_bench(names: Sequence[str]) -> dict[str, set[str]]:

@@ -37,6 +37,11 @@ def company(count: int) -> list[View]:
     return [replace(_view(pose, count), thumbnail=_thumbnail(pose)) for pose in (best, *partners[best])]
 
 
+def views(count: int) -> list[View]:
+    """A view from every viewpoint, with up to `count` RootSIFT features each."""
+    return [_view(pose, count) for pose in worlds.viewpoints(_world(), _VIEWPOINTS)]
+
+
 @cache
 def _world() -> World:
     return worlds.build(WORLD)

@@ -7,6 +7,7 @@ OpenCV camera axes (x right, y down, z forward); pixel centres at integers, an i
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -76,6 +77,16 @@ def relative(first: Pose, second: Pose) -> tuple[Floats, Floats]:
     second_from_world = second.world_from_camera.T
     rotation = second_from_world @ first.world_from_camera
     return rotation, second_from_world @ (first.centre_m - second.centre_m)
+
+
+def relatives(poses: Sequence[Pose], pairs: NDArray[np.integer]) -> tuple[Floats, Floats]:
+    """`relative` of many ordered pairs (n, 2) of poses: rotations (n, 3, 3) and translations (n, 3)."""
+    world_from_camera = np.array([pose.world_from_camera for pose in poses], np.float64).reshape(-1, 3, 3)
+    centres_m = np.array([pose.centre_m for pose in poses], np.float64).reshape(-1, 3)
+    first, second = np.asarray(pairs, np.intp).reshape(-1, 2).T
+    second_from_world = world_from_camera[second].transpose(0, 2, 1)
+    translations = second_from_world @ (centres_m[first] - centres_m[second])[:, :, None]
+    return second_from_world @ world_from_camera[first], translations[:, :, 0]
 
 
 def rotation_of(quaternion_xyzw: tuple[float, float, float, float]) -> Floats:

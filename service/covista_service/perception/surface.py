@@ -120,43 +120,56 @@ def _fit(
     n, k = index.shape
     floor, loss, ridge, clip = scales
     fitted = np.empty((2, n))
-    weight, ratio, relative = np.empty(k), np.empty(k), np.empty(k)
-    offset = np.empty((k, 2))
+    # Of a cell's neighbours: weight, offset (x, y) from the cell, inverse depth, scale of the loss, current weight.
+    near = np.empty((6, k))
     for i in range(n):
+        total, mean, error = 0.0, 0.0, 0.0
+        low, high = np.inf, -np.inf
         for c in range(k):
             j = index[i, c]
-            relative[c] = sigma[j] / rho[j]
-            spread = (relative[c] ** 2 + floor**2) * (distance[i, c] ** 2 + _CELL**2) ** 2
-            weight[c] = confidence[j] * likeness[i, c] / spread
-            ratio[c] = rho[j]
-            offset[c] = positions[j] - cells[i]
-        weight /= weight.sum()
-        mean = (weight * ratio).sum()
-        error = (weight * relative).sum()
-        low, high = ratio.min() * (1 - clip), ratio.max() * (1 + clip)
-        ratio /= mean
-        here = _affine(offset, ratio, loss + 2 * relative, weight, ridge**2 + error**2, passes)
-        fitted[0, i] = min(max(here * mean, low), high)
+            relative = sigma[j] / rho[j]
+            spread = (relative**2 + floor**2) * (distance[i, c] ** 2 + _CELL**2) ** 2
+            weight = confidence[j] * likeness[i, c] / spread
+            total += weight
+            mean += weight * rho[j]
+            error += weight * relative
+            low, high = min(low, rho[j]), max(high, rho[j])
+            near[0, c] = weight
+            near[1, c], near[2, c] = positions[j, 0] - cells[i, 0], positions[j, 1] - cells[i, 1]
+            near[3, c], near[4, c] = rho[j], loss + 2 * relative
+        mean /= total
+        error /= total
+        near[0] /= total
+        near[3] /= mean
+        here = _affine(near, ridge**2 + error**2, passes)
+        fitted[0, i] = min(max(here * mean, low * (1 - clip)), high * (1 + clip))
         fitted[1, i] = error
     return fitted
 
 
 @compiled
-def _affine(offset: Floats, ratio: Floats, scale: Floats, weight: Floats, damping: float, passes: int) -> float:
-    """Value at offset 0 of an affine fit to `ratio` (k,), its gradient damped, its residuals under Cauchy's loss."""
+def _affine(near: Floats, damping: float, passes: int) -> float:
+    """Value at offset 0 of an affine fit to the ratios near[3], its gradient damped, its residuals under Cauchy's loss.
+
+    `near` (6, k): weight, offset x and y, ratio, scale of the loss, and room for the weight under the loss.
+    """
     value, along, down = 1.0, 0.0, 0.0
-    w = weight.copy()
-    x, y = offset[:, 0], offset[:, 1]
+    weight, x, y, ratio, scale, w = near
     for step in range(passes + 1):
-        if step:
-            w = weight / (1 + ((ratio - value - along * x - down * y) / scale) ** 2)
-        w = w / w.sum()
-        mx, my, mr = (w * x).sum(), (w * y).sum(), (w * ratio).sum()
-        xx = (w * x * x).sum() - mx * mx + damping
-        xy = (w * x * y).sum() - mx * my
-        yy = (w * y * y).sum() - my * my + damping
-        xr = (w * x * ratio).sum() - mx * mr
-        yr = (w * y * ratio).sum() - my * mr
+        total, mx, my, mr = 0.0, 0.0, 0.0, 0.0
+        for c in range(len(w)):
+            w[c] = weight[c]
+            if step:
+                w[c] /= 1 + ((ratio[c] - value - along * x[c] - down * y[c]) / scale[c]) ** 2
+            total += w[c]
+            mx, my, mr = mx + w[c] * x[c], my + w[c] * y[c], mr + w[c] * ratio[c]
+        mx, my, mr = mx / total, my / total, mr / total
+        # About the mean, where nothing cancels.
+        xx, xy, yy, xr, yr = damping, 0.0, damping, 0.0, 0.0
+        for c in range(len(w)):
+            share, dx, dy = w[c] / total, x[c] - mx, y[c] - my
+            xx, xy, yy = xx + share * dx * dx, xy + share * dx * dy, yy + share * dy * dy
+            xr, yr = xr + share * dx * (ratio[c] - mr), yr + share * dy * (ratio[c] - mr)
         determinant = xx * yy - xy * xy
         along = (yy * xr - xy * yr) / determinant
         down = (xx * yr - xy * xr) / determinant

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from covista_service.perception.camera import Camera, Floats
-from covista_service.perception.compiled import compiled
+from covista_service.perception.sightlines import in_cells, look
 from covista_service.perception.surface import COLUMNS, ROWS, Surface
 
 Mask = NDArray[np.bool_]
-_AHEAD = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +37,33 @@ class Seeing:
     surface: Surface
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Gallery:
+    """Cameras and their surfaces, stacked, so that many pairs of them can be read in one pass.
+
+    Images are measured in cells: `cells_from_rays` (m, 3, 3) take (X, Y, Z) to column and row, `rays_from_cells`
+    (m, 3, 3) the indices of a cell to the ray of its centre, and `cell_px` (m, 2) is how wide and high a cell is.
+    `inverse_depth` and `sigma` (m, ROWS, COLUMNS) as in a surface; `range_of_row` (m, ROWS, 2): the least and greatest
+    inverse depth of a row of cells.
+    """
+
+    cells_from_rays: Floats
+    rays_from_cells: Floats
+    cell_px: Floats
+    inverse_depth: Floats
+    sigma: Floats
+    range_of_row: Floats
+
+    @classmethod
+    def of(cls, seeings: Sequence[Seeing]) -> Gallery:
+        """Stack them; a pair names its two by their places in this order."""
+        matrix = np.array([one.camera.matrix for one in seeings], np.float64).reshape(-1, 3, 3)
+        size = np.array([(one.camera.width, one.camera.height) for one in seeings], np.float64).reshape(-1, 2)
+        depth = np.array([one.surface.inverse_depth for one in seeings], np.float64).reshape(-1, ROWS, COLUMNS)
+        sigma = np.array([one.surface.sigma for one in seeings], np.float64).reshape(-1, ROWS, COLUMNS)
+        return cls(*in_cells(matrix, size), depth, sigma, np.stack((depth.min(axis=2), depth.max(axis=2)), axis=-1))
+
+
 def seen(
     first: Seeing,
     second: Seeing,
@@ -48,106 +75,65 @@ def seen(
 ) -> Mask:
     """Which cells (ROWS, COLUMNS) of the first image the second camera sees, for X_2 = R X_1 + t.
 
-    Their share is q of Eq. 16. A pixel v at inverse depth rho lies at A v + rho b in the other image, up to scale.
+    Their share is q of Eq. 16.
     """
-    back = first.camera.matrix @ rotation.T
-    hidden_from = options.tolerance if connected else options.unconnected_tolerance
-    return _seen(
-        np.column_stack(
-            (second.camera.matrix @ rotation @ first.camera.rays_from_pixels, second.camera.matrix @ translation)
-        ),
-        np.column_stack((back @ second.camera.rays_from_pixels, -back @ translation)),
-        np.array([first.camera.width, first.camera.height, second.camera.width, second.camera.height], np.float64),
-        first.surface.inverse_depth,
-        second.surface.inverse_depth,
-        second.surface.sigma,
-        hidden_from,
-        options.parallax_px,
-        connected,
+    pair = np.array([[0, 1]])
+    masks = seen_masks(
+        Gallery.of((first, second)), pair, rotation[None], translation[None], np.array([connected]), options
     )
+    return np.asarray(masks[0], np.bool_)
 
 
-@compiled
-def _seen(
-    forth: Floats,
-    back: Floats,
-    sizes: Floats,
-    rho: Floats,
-    other_rho: Floats,
-    other_sigma: Floats,
-    tolerance: float,
-    parallax_px: float,
-    connected: bool,
+def seen_shares(
+    gallery: Gallery,
+    pairs: NDArray[np.integer],
+    rotations: Floats,
+    translations: Floats,
+    connected: Mask,
+    options: VisibilityOptions,
+) -> Floats:
+    """Shares q (n,) of Eq. 16 for ordered pairs (n, 2) of the gallery: the mean of `seen`, many times faster.
+
+    `rotations` (n, 3, 3) and `translations` (n, 3) m say X_2 = R X_1 + t for each pair, `connected` (n,) as for `seen`.
+    """
+    return _look(gallery, pairs, rotations, translations, connected, options, 1)[0]
+
+
+def seen_masks(
+    gallery: Gallery,
+    pairs: NDArray[np.integer],
+    rotations: Floats,
+    translations: Floats,
+    connected: Mask,
+    options: VisibilityOptions,
 ) -> Mask:
-    rows, columns = rho.shape
-    mask = np.zeros((rows, columns), np.bool_)
-    ratio = 1.0 if connected else _median_ratio(forth, sizes, rho, other_rho)
-    for r in range(rows):
-        for c in range(columns):
-            u, v, here = _moved(forth, sizes, r, c, rho[r, c])
-            if here <= 0:
-                continue
-            i, j = int((v + 0.5) * rows / sizes[3]), int((u + 0.5) * columns / sizes[2])
-            there = _sampled(other_rho, u, v, sizes) * ratio
-            if connected:
-                nearer = here < there * (1 - tolerance - other_sigma[i, j])
-                mask[r, c] = not (nearer and _parallax(back, u, v, here, there) > parallax_px)
-            else:
-                mask[r, c] = here >= there * (1 - tolerance)
-    return mask
+    """Which cells (n, ROWS, COLUMNS) of the first image of each pair its second camera sees."""
+    return _look(gallery, pairs, rotations, translations, connected, options, len(pairs))[1]
 
 
-@compiled
-def _moved(forth: Floats, sizes: Floats, r: int, c: int, rho: float) -> tuple[float, float, float]:
-    """Where a cell's centre lies in the other image (u, v), and its inverse depth there; 0 if it is not in it."""
-    x = (c + 0.5) * sizes[0] / COLUMNS - 0.5
-    y = (r + 0.5) * sizes[1] / ROWS - 0.5
-    w = forth[2, 0] * x + forth[2, 1] * y + forth[2, 2] + rho * forth[2, 3]
-    if w <= _AHEAD:
-        return 0.0, 0.0, 0.0
-    u = (forth[0, 0] * x + forth[0, 1] * y + forth[0, 2] + rho * forth[0, 3]) / w
-    v = (forth[1, 0] * x + forth[1, 1] * y + forth[1, 2] + rho * forth[1, 3]) / w
-    inside = -0.5 <= u < sizes[2] - 0.5 and -0.5 <= v < sizes[3] - 0.5
-    return u, v, rho / w if inside else 0.0
-
-
-@compiled
-def _sampled(grid: Floats, u: float, v: float, sizes: Floats) -> float:
-    """Bilinear between the cells' centres, constant beyond the outermost."""
-    rows, columns = grid.shape
-    x = min(max((u + 0.5) * columns / sizes[2] - 0.5, 0.0), columns - 1.0)
-    y = min(max((v + 0.5) * rows / sizes[3] - 0.5, 0.0), rows - 1.0)
-    j, i = min(int(x), columns - 2), min(int(y), rows - 2)
-    x, y = x - j, y - i
-    upper = (1 - x) * grid[i, j] + x * grid[i, j + 1]
-    lower = (1 - x) * grid[i + 1, j] + x * grid[i + 1, j + 1]
-    return float((1 - y) * upper + y * lower)
-
-
-@compiled
-def _parallax(back: Floats, u: float, v: float, one: float, other: float) -> float:
-    """How far apart, in px of the first image, two inverse depths along a pixel of the second lie."""
-    x = back[0, 0] * u + back[0, 1] * v + back[0, 2]
-    y = back[1, 0] * u + back[1, 1] * v + back[1, 2]
-    w = back[2, 0] * u + back[2, 1] * v + back[2, 2]
-    w1, w2 = w + one * back[2, 3], w + other * back[2, 3]
-    if w1 <= _AHEAD or w2 <= _AHEAD:
-        return np.inf
-    across = (x + one * back[0, 3]) / w1 - (x + other * back[0, 3]) / w2
-    along = (y + one * back[1, 3]) / w1 - (y + other * back[1, 3]) / w2
-    return float(np.sqrt(across * across + along * along))
-
-
-@compiled
-def _median_ratio(forth: Floats, sizes: Floats, rho: Floats, other_rho: Floats) -> float:
-    """Median of the first surface's inverse depths over the second's, where they meet; 1 if nowhere."""
-    rows, columns = rho.shape
-    ratios = np.empty(rows * columns)
-    count = 0
-    for r in range(rows):
-        for c in range(columns):
-            u, v, here = _moved(forth, sizes, r, c, rho[r, c])
-            if here > 0:
-                ratios[count] = here / _sampled(other_rho, u, v, sizes)
-                count += 1
-    return float(np.median(ratios[:count])) if count else 1.0
+def _look(
+    gallery: Gallery,
+    pairs: NDArray[np.integer],
+    rotations: Floats,
+    translations: Floats,
+    connected: Mask,
+    options: VisibilityOptions,
+    masks: int,
+) -> tuple[Floats, Mask]:
+    """Shares, and as many masks as asked for: with fewer than pairs, only the shares are of use."""
+    seen = np.empty((masks, ROWS, COLUMNS), np.bool_)
+    counts = look(
+        np.ascontiguousarray(pairs, np.int64).reshape(-1, 2),
+        np.ascontiguousarray(rotations, np.float64).reshape(-1, 3, 3),
+        np.ascontiguousarray(translations, np.float64).reshape(-1, 3),
+        np.ascontiguousarray(connected, np.bool_),
+        gallery.cells_from_rays,
+        gallery.rays_from_cells,
+        gallery.cell_px,
+        gallery.inverse_depth,
+        gallery.sigma,
+        gallery.range_of_row,
+        np.array([options.tolerance, options.parallax_px**2, options.unconnected_tolerance]),
+        seen,
+    )
+    return counts / (ROWS * COLUMNS), seen

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import pytest
 from covista_service.bench import runner
 from covista_service.bench.row import Row, alternately_ms, median, spread
@@ -15,8 +17,11 @@ def benches(monkeypatch: pytest.MonkeyPatch) -> None:
         runner,
         "BENCHES",
         {
-            "survey": lambda long: iter([row("survey", "cold_500"), row("survey", "cold_1000")]),
-            "latency": lambda long: iter([row("latency", "p50")]),
+            "survey": (
+                lambda long: iter([row("survey", "cold_500")]),
+                lambda long: iter([row("survey", "cold_1000")]),
+            ),
+            "latency": (lambda long: iter([row("latency", "p50")]),),
         },
     )
 
@@ -36,18 +41,19 @@ def test_names_choose_benches_and_cases(names: tuple[str, ...], cases: list[str]
     assert [each.case for each in runner.run(names, long=False)] == cases
 
 
+def test_a_bench_ends_when_all_cases_asked_for_are_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    def never(long: bool) -> Iterator[Row]:
+        raise AssertionError("nobody asked for more")
+
+    monkeypatch.setattr(runner, "BENCHES", {"survey": (lambda long: iter([row("survey", "cold_500")]), never)})
+    assert [each.case for each in runner.run(("survey/cold_500",), long=False)] == ["cold_500"]
+
+
 @pytest.mark.usefixtures("benches")
 @pytest.mark.parametrize("name", ["speed", "survey/warm"])
 def test_a_name_that_nothing_has_is_refused(name: str) -> None:
     with pytest.raises(runner.UnknownBenchError):
         list(runner.run((name,), long=False))
-
-
-def test_one_bench_may_be_of_several_parts() -> None:
-    both = runner.together(
-        lambda long: iter([row("survey", "cold_500")]), lambda long: iter([row("survey", "dense" if long else "short")])
-    )
-    assert [each.case for each in both(True)] == ["cold_500", "dense"]
 
 
 def test_calls_take_turns_after_a_round_that_does_not_count() -> None:

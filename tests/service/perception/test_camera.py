@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from covista_service.perception.camera import Camera, Pose, relative, rotation_of, undistort
+from covista_service.perception.camera import Camera, Pose, relative, relatives, rotation_of, undistort
 
 from tests.service.perception.scenes import CAMERA, turn
 
@@ -18,6 +18,17 @@ def test_relative_pose_takes_points_from_one_camera_to_the_other() -> None:
     world = one.world_from_camera @ in_first + one.centre_m
     in_second = other.world_from_camera.T @ (world - other.centre_m)
     np.testing.assert_allclose(rotation @ in_first + translation, in_second, atol=1e-12)
+
+
+def test_relative_poses_of_many_are_those_of_each() -> None:
+    random = np.random.default_rng(0)
+    poses = [Pose(turn(*random.normal(0, 1, 3)), random.normal(0, 3, 3)) for _ in range(5)]
+    pairs = np.array([(i, j) for i in range(5) for j in range(5)])
+    rotations, translations = relatives(poses, pairs)
+    for (i, j), rotation, translation in zip(pairs, rotations, translations, strict=True):
+        np.testing.assert_allclose(rotation, relative(poses[i], poses[j])[0], atol=1e-12)
+        np.testing.assert_allclose(translation, relative(poses[i], poses[j])[1], atol=1e-12)
+    assert [len(none) for none in relatives(poses, np.zeros((0, 2), np.intp))] == [0, 0]
 
 
 def test_a_quarter_turn() -> None:

@@ -1,9 +1,17 @@
 import numpy as np
 import pytest
-from covista_service.perception.camera import Floats, Pose, relative
+from covista_service.perception.camera import Camera, Floats, Pose, relative, relatives
 from covista_service.perception.frustum import overlap
-from covista_service.perception.surface import COLUMNS, ROWS, Surface, flat
-from covista_service.perception.visibility import Seeing, VisibilityOptions, seen
+from covista_service.perception.surface import COLUMNS, ROWS, Surface, cell_centres, flat
+from covista_service.perception.visibility import (
+    Gallery,
+    Mask,
+    Seeing,
+    VisibilityOptions,
+    seen,
+    seen_masks,
+    seen_shares,
+)
 
 from tests.service.perception.scenes import CAMERA, ORIGIN, turn
 
@@ -59,3 +67,86 @@ def test_unconnected_scales_are_taken_out() -> None:
     other = Seeing(CAMERA, flat(1 / 3, 0.01))
     assert share(FAR, other, ORIGIN, at(1.0)) == 0
     assert share(FAR, other, ORIGIN, at(1.0), connected=False) > 0.7
+
+
+CAMERAS = (CAMERA, Camera(np.array([[300.0, 2.0, 150], [0, 310.0, 130], [0, 0, 1]]), 320, 240))
+
+
+def hilly(random: np.random.Generator, camera: Camera) -> Seeing:
+    """Waves of depth between 2 and 6 m, and a step."""
+    x, y = (cell_centres(camera) / camera.width * 6).T
+    depth = 4 + np.sin(x * random.uniform(0.5, 2) + random.uniform(0, 6)) + np.cos(y * random.uniform(0.5, 2))
+    depth[x > random.uniform(2, 6)] *= 0.8
+    inverse_depth = (1 / depth).reshape(ROWS, COLUMNS)
+    return Seeing(camera, Surface(inverse_depth, random.uniform(0.01, 0.2, (ROWS, COLUMNS))))
+
+
+def swarm(seed: int, count: int = 8) -> tuple[list[Seeing], list[Pose], np.ndarray]:
+    random = np.random.default_rng(seed)
+    seeings = [hilly(random, CAMERAS[k % 2]) for k in range(count)]
+    poses = [Pose(turn(*random.normal(0, 0.4, 3)), random.normal(0, 0.7, 3)) for _ in range(count)]
+    return seeings, poses, np.array([(i, j) for i in range(count) for j in range(count)])
+
+
+def bilinear(grid: Floats, x: Floats, y: Floats) -> Floats:
+    x, y = np.clip(x, 0, COLUMNS - 1), np.clip(y, 0, ROWS - 1)
+    j, i = np.minimum(x.astype(int), COLUMNS - 2), np.minimum(y.astype(int), ROWS - 2)
+    x, y = x - j, y - i
+    upper, lower = ((1 - x) * grid[i + k, j] + x * grid[i + k, j + 1] for k in (0, 1))
+    return np.asarray((1 - y) * upper + y * lower, np.float64)
+
+
+def by_the_book(first: Seeing, second: Seeing, rotation: Floats, translation: Floats, connected: bool) -> Mask:
+    """Point by point: into the second image, and back from either surface into the first."""
+    pixels, size = cell_centres(first.camera), np.array([second.camera.width, second.camera.height])
+    rays = np.column_stack((pixels, np.ones(len(pixels)))) @ first.camera.rays_from_pixels.T
+    points = rays / first.surface.inverse_depth.reshape(-1, 1) @ rotation.T + translation
+    seen = points[:, 2] > 0
+    projected = points[seen] @ second.camera.matrix.T
+    at = projected[:, :2] / projected[:, 2:] + 0.5
+    inside = ((at >= 0) & (at < size)).all(axis=1)
+    seen[seen] = inside
+    cell = at[inside] * (COLUMNS, ROWS) / size
+    here, there = 1 / points[seen, 2], bilinear(second.surface.inverse_depth, *(cell - 0.5).T)
+    if connected:
+        nearer = second.camera.rays_from_pixels @ np.column_stack((at[inside] - 0.5, np.ones(len(here)))).T / there
+        back = (nearer.T - translation) @ rotation @ first.camera.matrix.T
+        parallax = np.linalg.norm(back[:, :2] / back[:, 2:] - pixels[seen], axis=1)
+        parallax[back[:, 2] <= 0] = np.inf
+        column, row = cell.astype(int).T
+        limit = 1 - OPTIONS.tolerance - second.surface.sigma[row, column]
+        seen[seen] = (here >= there * limit) | (parallax <= OPTIONS.parallax_px)
+    elif len(here):
+        seen[seen] = here >= there * np.median(here / there) * (1 - OPTIONS.unconnected_tolerance)
+    return seen.reshape(ROWS, COLUMNS)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_many_pairs_at_once_are_the_same_as_each_alone(seed: int) -> None:
+    seeings, poses, pairs = swarm(seed)
+    connected = np.random.default_rng(seed).random(len(pairs)) < 0.5
+    found = (Gallery.of(seeings), pairs, *relatives(poses, pairs), connected, OPTIONS)
+    shares, masks = seen_shares(*found), seen_masks(*found)
+    assert (shares == masks.mean(axis=(1, 2))).all()
+    assert 0 < shares.mean() < 1
+    for k, (i, j) in enumerate(pairs):
+        alone = seen(seeings[i], seeings[j], found[2][k], found[3][k], OPTIONS, connected=bool(connected[k]))
+        assert (masks[k] == alone).all()
+
+
+@pytest.mark.parametrize("connected", [True, False])
+def test_cells_are_seen_as_point_by_point(connected: bool) -> None:
+    seeings, poses, pairs = swarm(7)
+    found = relatives(poses, pairs)
+    masks = seen_masks(Gallery.of(seeings), pairs, *found, np.full(len(pairs), connected), OPTIONS)
+    for mask, (i, j), rotation, translation in zip(masks, pairs, *found, strict=True):
+        # A point on the border of an image or of a tolerance may be rounded to either side.
+        assert (mask != by_the_book(seeings[i], seeings[j], rotation, translation, connected)).sum() <= 1
+
+
+def test_no_pairs_have_no_shares() -> None:
+    seeings, poses, _ = swarm(0, 2)
+    none = np.zeros((0, 2), np.intp)
+    found = (Gallery.of(seeings), none, *relatives(poses, none), np.zeros(0, np.bool_), OPTIONS)
+    assert seen_shares(*found).shape == (0,)
+    assert seen_masks(*found).shape == (0, ROWS, COLUMNS)
