@@ -15,6 +15,11 @@ from covista_service.perception.surface import COLUMNS, ROWS
 
 Mask = NDArray[np.bool_]
 _AHEAD = 1e-9
+# Places of the clues; what they say stands at `visibility.Clues`.
+CLUES = 5
+_APART, _BEFORE, _HIDDEN, _INNER, _OUTER = 0, 1, 2, 3, 4
+# Further apart than this share of its inverse depth, a surface is simply another one.
+_FARTHEST_APART = 0.5
 
 
 @compiled
@@ -43,34 +48,60 @@ def look(
     pairs: NDArray[np.int64],
     rotations: Floats,
     translations: Floats,
-    connected: Mask,
+    ratios: Floats,
     cells_from_rays: Floats,
     rays_from_cells: Floats,
     cell_px: Floats,
     inverse_depth: Floats,
     sigma: Floats,
     range_of_row: Floats,
-    tolerances: Floats,
+    limits: Floats,
     masks: Mask,
+    clues: Floats,
 ) -> NDArray[np.int64]:
-    """Number of cells seen of each pair; masks are written to `masks`, over and over if there are fewer of them."""
+    """Number of cells seen of each pair; masks are written to `masks`, over and over if there are fewer of them.
+
+    `limits`: tolerance, squared parallax in px, tolerance between unconnected keyframes, and the edge in image widths.
+    `clues` (n, CLUES) is filled, unless it is empty.
+    """
     counts = np.empty(len(pairs), np.int64)
-    forms = np.empty((5, 4))
+    weigh = len(clues) > 0
+    nothing = np.empty(CLUES)
+    forms, wide = np.empty((5, 4)), np.empty((5, 4))
     spans = np.empty((ROWS, 2), np.int64)
-    ratios = np.empty(ROWS * COLUMNS)
+    found = np.empty(ROWS * COLUMNS)
     for k in range(len(pairs)):
         i, j = pairs[k]
         mask = masks[k % len(masks)]
         mask[:] = False
+        mine = clues[k] if weigh else nothing
+        mine[:] = 0.0
         _project(rotations[k], translations[k], cells_from_rays[j], rays_from_cells[i], forms)
-        _frame(forms, range_of_row[i], spans)
-        if connected[k]:
-            epipole = _epipole(rotations[k], translations[k], cells_from_rays[i])
-            counts[k] = _connected(
-                forms, epipole, cell_px[i], spans, inverse_depth[i], inverse_depth[j], sigma[j], tolerances, mask
-            )
-        else:
-            counts[k] = _unconnected(forms, spans, inverse_depth[i], inverse_depth[j], tolerances[2], ratios, mask)
+        edge_px = limits[3] * COLUMNS * cell_px[j, 0] if weigh else 0.0
+        _widen(forms, edge_px / cell_px[j, 0], edge_px / cell_px[j, 1], wide)
+        _frame(wide, range_of_row[i], spans)
+        connected = ratios[k, 0] == 1 and ratios[k, 1] == 1
+        ratio = 1.0
+        if not connected:
+            ratio = _median_ratio(forms, spans, inverse_depth[i], inverse_depth[j], found)
+            # A wall between two parts looks like another scale: no more is taken out than scales can be off by.
+            ratio = min(max(ratio, ratios[k, 0]), ratios[k, 1])
+        counts[k] = _seen(
+            forms,
+            _epipole(rotations[k], translations[k], cells_from_rays[i]),
+            cell_px[i],
+            cell_px[j],
+            edge_px,
+            spans,
+            inverse_depth[i],
+            inverse_depth[j],
+            sigma[j],
+            limits,
+            ratio,
+            connected,
+            mask,
+            mine,
+        )
     return counts
 
 
@@ -129,20 +160,40 @@ def _frame(forms: Floats, range_of_row: Floats, out: NDArray[np.int64]) -> None:
 
 
 @compiled
-def _connected(
+def _widen(forms: Floats, across: float, along: float, out: Floats) -> None:
+    """The same forms for an image that is so many cells wider on each side."""
+    for b in range(4):
+        out[0, b] = forms[0, b] + across * forms[2, b]
+        out[1, b] = forms[1, b] + along * forms[2, b]
+        out[2, b] = forms[2, b]
+        out[3, b] = forms[3, b] + across * forms[2, b]
+        out[4, b] = forms[4, b] + along * forms[2, b]
+
+
+@compiled
+def _seen(
     forms: Floats,
     epipole: tuple[float, float, float],
     cell_px: Floats,
+    other_cell_px: Floats,
+    edge_px: float,
     spans: NDArray[np.int64],
     rho: Floats,
     other_rho: Floats,
     other_sigma: Floats,
-    tolerances: Floats,
+    limits: Floats,
+    ratio: float,
+    connected: bool,
     mask: Mask,
+    clues: Floats,
 ) -> int:
-    """Number of cells seen, and which, between keyframes whose depths have one scale."""
+    """Number of cells seen, which, and the clues; `ratio` of the scale of the first keyframe's depths to the second's.
+
+    Without `connected` the two know of no more than that ratio.
+    """
     count = 0
-    ahead, hidden_from, parallax = epipole[2], 1 - tolerances[0], tolerances[1]
+    weigh = edge_px > 0
+    ahead, room, parallax = epipole[2], limits[0] if connected else limits[2], limits[1]
     for r in range(ROWS):
         u0, v0, w0 = (
             forms[0, 1] * r + forms[0, 2],
@@ -158,60 +209,70 @@ def _connected(
             u = (forms[0, 0] * c + u0 + forms[0, 3] * here) / w
             v = (forms[1, 0] * c + v0 + forms[1, 3] * here) / w
             if not (0 <= u < COLUMNS and 0 <= v < ROWS):
+                if weigh:
+                    clues[_OUTER] += max(0.0, 1 + _margin_px(u, v, other_cell_px) / edge_px)
                 continue
             # As if measured in the first image: by how much the second surface is nearer along the ray.
-            there = _sampled(other_rho, u, v) * w
-            visible = True
-            if here < there * (hidden_from - other_sigma[int(v), int(u)]):
+            there = _sampled(other_rho, u, v) * w * ratio
+            trusted = room + other_sigma[int(v), int(u)] if connected else room
+            hidden = here < there * (1 - trusted)
+            if hidden and connected:
                 nearer = there - here
                 along = (epipole[0] - (c + 0.5) * ahead) * cell_px[0]
                 left = 1 + nearer * ahead
-                visible = left > 0 and nearer * nearer * (along * along + down * down) <= parallax * left * left
-            mask[r, c] = visible
-            count += visible
+                hidden = left <= 0 or nearer * nearer * (along * along + down * down) > parallax * left * left
+            mask[r, c] = not hidden
+            count += not hidden
+            if weigh:
+                _weigh(u, v, here / there, trusted, hidden, edge_px, other_cell_px, clues)
+    if weigh:
+        clues /= ROWS * COLUMNS
     return count
 
 
 @compiled
-def _unconnected(
-    forms: Floats,
-    spans: NDArray[np.int64],
-    rho: Floats,
-    other_rho: Floats,
-    tolerance: float,
-    ratios: Floats,
-    mask: Mask,
-) -> int:
-    """Number of cells seen, and which, where only the ratio of two scales is known: by its median."""
+def _weigh(
+    u: float,
+    v: float,
+    ratio: float,
+    trusted: float,
+    hidden: bool,
+    edge_px: float,
+    other_cell_px: Floats,
+    clues: Floats,
+) -> None:
+    """Enter what a cell that lies in the other image tells of how sure the count is."""
+    if hidden:
+        clues[_HIDDEN] += 1
+        return
+    clues[_INNER] += max(0.0, 1 - _margin_px(u, v, other_cell_px) / edge_px)
+    clues[_BEFORE if ratio > 1 + trusted else _APART] += min(abs(ratio - 1), _FARTHEST_APART)
+
+
+@compiled
+def _margin_px(u: float, v: float, cell_px: Floats) -> float:
+    """Px from a place in cells to the border of the image; outside negative, by the farther of two borders missed."""
+    return float(min(min(u, COLUMNS - u) * cell_px[0], min(v, ROWS - v) * cell_px[1]))
+
+
+@compiled
+def _median_ratio(
+    forms: Floats, spans: NDArray[np.int64], rho: Floats, other_rho: Floats, found: Floats
+) -> float:
+    """Median of the first surface's inverse depths over the second's, where they meet; 1 if nowhere."""
     met = 0
     for r in range(ROWS):
-        u0, v0, w0 = (
-            forms[0, 1] * r + forms[0, 2],
-            forms[1, 1] * r + forms[1, 2],
-            forms[2, 1] * r + forms[2, 2],
-        )
         for c in range(spans[r, 0], spans[r, 1]):
             here = rho[r, c]
-            w = forms[2, 0] * c + w0 + forms[2, 3] * here
+            w = forms[2, 0] * c + forms[2, 1] * r + forms[2, 2] + forms[2, 3] * here
             if w <= _AHEAD:
                 continue
-            u = (forms[0, 0] * c + u0 + forms[0, 3] * here) / w
-            v = (forms[1, 0] * c + v0 + forms[1, 3] * here) / w
+            u = (forms[0, 0] * c + forms[0, 1] * r + forms[0, 2] + forms[0, 3] * here) / w
+            v = (forms[1, 0] * c + forms[1, 1] * r + forms[1, 2] + forms[1, 3] * here) / w
             if 0 <= u < COLUMNS and 0 <= v < ROWS:
-                ratios[met] = here / (_sampled(other_rho, u, v) * w)
-                mask[r, c] = True
+                found[met] = here / (_sampled(other_rho, u, v) * w)
                 met += 1
-    if met == 0:
-        return 0
-    least = np.median(ratios[:met]) * (1 - tolerance)
-    count, met = 0, 0
-    for r in range(ROWS):
-        for c in range(spans[r, 0], spans[r, 1]):
-            if mask[r, c]:
-                mask[r, c] = ratios[met] >= least
-                count += mask[r, c]
-                met += 1
-    return count
+    return float(np.median(found[:met])) if met else 1.0
 
 
 @compiled

@@ -13,6 +13,13 @@ from covista_service.perception.sightlines import in_cells, look
 from covista_service.perception.surface import COLUMNS, ROWS, Surface
 
 Mask = NDArray[np.bool_]
+# Of keyframes that matches connect.
+SAME_SCALE = (1.0, 1.0)
+# What may be wrong about a count of cells, each a share of all cells. `apart`: by how much of their inverse depth the
+# two surfaces differ, over cells where they show the same; `before`: the same over cells that stand before all that
+# the other camera saw there. `hidden`: cells taken to be hidden. `inner_edge`, `outer_edge`: cells seen near the other
+# image's border, and cells that just miss it.
+CLUES = ("apart", "before", "hidden", "inner_edge", "outer_edge")
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,13 +27,16 @@ class VisibilityOptions:
     """A point is hidden if the other camera's surface is nearer by `tolerance` of its inverse depth plus sigma.
 
     And by more than `parallax_px` in the image, or tiny baselines would turn noise into occlusions. Between keyframes
-    that no chain of matches connects, depths have scales of their own: there the median ratio is taken out and
-    `unconnected_tolerance` holds.
+    that no chain of matches connects, depths have scales of their own: there the median ratio is taken out, as far as
+    `scale_sigmas` of those scales allow, and `unconnected_tolerance` holds. Up to `edge` image widths from its border
+    is near to it.
     """
 
     tolerance: float = 0.05
     parallax_px: float = 4.0
     unconnected_tolerance: float = 0.25
+    scale_sigmas: float = 3.0
+    edge: float = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,6 +74,14 @@ class Gallery:
         return cls(*in_cells(matrix, size), depth, sigma, np.stack((depth.min(axis=2), depth.max(axis=2)), axis=-1))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Looks:
+    """What many ordered pairs see: `shares` q (n,) of Eq. 16, and the `clues` (n, 5) of each, in the order of CLUES."""
+
+    shares: Floats
+    clues: Floats
+
+
 def seen(
     first: Seeing,
     second: Seeing,
@@ -71,16 +89,15 @@ def seen(
     translation: Floats,
     options: VisibilityOptions,
     *,
-    connected: bool = True,
+    ratios: tuple[float, float] = SAME_SCALE,
 ) -> Mask:
     """Which cells (ROWS, COLUMNS) of the first image the second camera sees, for X_2 = R X_1 + t.
 
-    Their share is q of Eq. 16.
+    Their share is q of Eq. 16. `ratios`: for keyframes that matches do not connect, the least and greatest ratio that
+    the scales of their depths may have.
     """
     pair = np.array([[0, 1]])
-    masks = seen_masks(
-        Gallery.of((first, second)), pair, rotation[None], translation[None], np.array([connected]), options
-    )
+    masks = seen_masks(Gallery.of((first, second)), pair, rotation[None], translation[None], np.array([ratios]), options)
     return np.asarray(masks[0], np.bool_)
 
 
@@ -89,14 +106,27 @@ def seen_shares(
     pairs: NDArray[np.integer],
     rotations: Floats,
     translations: Floats,
-    connected: Mask,
+    ratios: Floats,
     options: VisibilityOptions,
 ) -> Floats:
     """Shares q (n,) of Eq. 16 for ordered pairs (n, 2) of the gallery: the mean of `seen`, many times faster.
 
-    `rotations` (n, 3, 3) and `translations` (n, 3) m say X_2 = R X_1 + t for each pair, `connected` (n,) as for `seen`.
+    `rotations` (n, 3, 3) and `translations` (n, 3) m say X_2 = R X_1 + t for each pair, `ratios` (n, 2) as for `seen`.
     """
-    return _look(gallery, pairs, rotations, translations, connected, options, 1)[0]
+    return _look(gallery, pairs, rotations, translations, ratios, options, 1, weigh=False)[0]
+
+
+def looks(
+    gallery: Gallery,
+    pairs: NDArray[np.integer],
+    rotations: Floats,
+    translations: Floats,
+    ratios: Floats,
+    options: VisibilityOptions,
+) -> Looks:
+    """The same with what may be wrong about each share."""
+    shares, _, clues = _look(gallery, pairs, rotations, translations, ratios, options, 1, weigh=True)
+    return Looks(shares, clues)
 
 
 def seen_masks(
@@ -104,11 +134,11 @@ def seen_masks(
     pairs: NDArray[np.integer],
     rotations: Floats,
     translations: Floats,
-    connected: Mask,
+    ratios: Floats,
     options: VisibilityOptions,
 ) -> Mask:
     """Which cells (n, ROWS, COLUMNS) of the first image of each pair its second camera sees."""
-    return _look(gallery, pairs, rotations, translations, connected, options, len(pairs))[1]
+    return _look(gallery, pairs, rotations, translations, ratios, options, len(pairs), weigh=False)[1]
 
 
 def _look(
@@ -116,24 +146,28 @@ def _look(
     pairs: NDArray[np.integer],
     rotations: Floats,
     translations: Floats,
-    connected: Mask,
+    ratios: Floats,
     options: VisibilityOptions,
     masks: int,
-) -> tuple[Floats, Mask]:
-    """Shares, and as many masks as asked for: with fewer than pairs, only the shares are of use."""
+    *,
+    weigh: bool,
+) -> tuple[Floats, Mask, Floats]:
+    """Shares, and as many masks as asked for: with fewer than pairs, only the shares are of use. Clues, if weighed."""
     seen = np.empty((masks, ROWS, COLUMNS), np.bool_)
+    clues = np.empty((len(pairs) if weigh else 0, len(CLUES)))
     counts = look(
         np.ascontiguousarray(pairs, np.int64).reshape(-1, 2),
         np.ascontiguousarray(rotations, np.float64).reshape(-1, 3, 3),
         np.ascontiguousarray(translations, np.float64).reshape(-1, 3),
-        np.ascontiguousarray(connected, np.bool_),
+        np.ascontiguousarray(ratios, np.float64).reshape(-1, 2),
         gallery.cells_from_rays,
         gallery.rays_from_cells,
         gallery.cell_px,
         gallery.inverse_depth,
         gallery.sigma,
         gallery.range_of_row,
-        np.array([options.tolerance, options.parallax_px**2, options.unconnected_tolerance]),
+        np.array([options.tolerance, options.parallax_px**2, options.unconnected_tolerance, options.edge]),
         seen,
+        clues,
     )
-    return counts / (ROWS * COLUMNS), seen
+    return counts / (ROWS * COLUMNS), seen, clues
