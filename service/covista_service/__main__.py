@@ -12,6 +12,7 @@ from covista_schemas.errors import CovistaError, MissingExtraError
 
 from covista_service.bench.command import bench
 from covista_service.demo.command import demo
+from covista_service.evaluation.calibration_command import calibrate
 from covista_service.evaluation.command import evaluate
 from covista_service.evaluation.paper.command import paper
 
@@ -89,7 +90,7 @@ def _refuse(line: str, status: int) -> None:
     raise typer.Exit(status)
 
 
-for _command in (demo, evaluate, paper, bench):
+for _command in (demo, evaluate, calibrate, paper, bench):
     application.command()(_command)
 
 

@@ -84,7 +84,7 @@ def test_surfaces_are_built(workers: Workers, thumbnail: bytes | None) -> None:
     one, other = (
         Outlook(keyframe(name), each.pose, each.surface, 50, {}) for name, each in zip(names, settled, strict=True)
     )
-    assert masks(one, other, connected=True)[0].mean() == pytest.approx(overlap(1.0), abs=0.05)
+    assert masks(one, other, (1.0, 1.0))[0].mean() == pytest.approx(overlap(1.0), abs=0.05)
 
 
 def test_what_is_wrong_with_a_picture_comes_back(workers: Workers) -> None:

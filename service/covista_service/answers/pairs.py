@@ -79,7 +79,7 @@ def common_regions(view: PairView) -> tuple[list[Floats], list[Floats]]:
     """The common field in a's image and in b's: polygons (k, 2) in px, by the surfaces that the overlaps come from."""
     if view.outlooks is None:
         return [], []
-    seen = masks(*view.outlooks, connected=view.connected)
+    seen = masks(*view.outlooks, view.ratios)
     cameras = [outlook.keyframe.camera for outlook in view.outlooks]
     in_a, in_b = (
         [np.array(region) for region in regions(mask, camera, RegionOptions())]
@@ -90,13 +90,17 @@ def common_regions(view: PairView) -> tuple[list[Floats], list[Floats]]:
 
 def _pair(view: PairView, first: Literal["a", "b"]) -> dict[str, object]:
     """The fields of a summary, with the robot that is to come first as `a`."""
-    sides = [(view.a, view.overlap_a, view.keyframe_a), (view.b, view.overlap_b, view.keyframe_b)]
-    (a, overlap_a, keyframe_a), (b, overlap_b, keyframe_b) = sides if first == "a" else reversed(sides)
+    sure_a, sure_b = view.intervals or (None, None)
+    sides = [(view.a, view.overlap_a, sure_a, view.keyframe_a), (view.b, view.overlap_b, sure_b, view.keyframe_b)]
+    one, other = sides if first == "a" else sides[::-1]
+    (a, overlap_a, interval_a, keyframe_a), (b, overlap_b, interval_b, keyframe_b) = one, other
     return {
         "a": a,
         "b": b,
         "overlap_a": overlap_a,
         "overlap_b": overlap_b,
+        "interval_a": interval_a,
+        "interval_b": interval_b,
         "found_by": view.found_by,
         "outcome": view.outcome,
         "inliers": view.inliers,

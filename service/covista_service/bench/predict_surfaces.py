@@ -12,11 +12,12 @@ from covista_service.bench.scene import views
 from covista_service.bench.threads import one_thread
 from covista_service.perception.camera import relatives
 from covista_service.perception.scene import Scene, SceneOptions, reconstruct
-from covista_service.perception.visibility import Gallery, Seeing, seen_shares
+from covista_service.perception.visibility import SAME_SCALE, Gallery, Seeing, seen_shares
 
 MARK_PER_S = 30_000.0
 _FEATURES = 500
 _AT_ONCE = 1000
+_ANY_RATIO = (0.1, 10.0)
 _ROUNDS, _LONG_ROUNDS = 20, 200
 
 
@@ -37,8 +38,9 @@ def _surfaces(scene: Scene, rounds: int) -> Row:
 
     def read(pairs: np.ndarray) -> np.ndarray:
         connected = scene.parts[with_surface][pairs]
-        same = connected[:, 0] == connected[:, 1]
-        return seen_shares(gallery, pairs, *relatives(poses, pairs), same, scene.options.visibility)
+        same = (connected[:, 0] == connected[:, 1])[:, None]
+        ratios = np.where(same, SAME_SCALE, _ANY_RATIO)
+        return seen_shares(gallery, pairs, *relatives(poses, pairs), ratios, scene.options.visibility)
 
     pairs = np.array(list(permutations(range(len(poses)), 2)))
     meeting = np.resize(pairs[read(pairs) > 0], (_AT_ONCE, 2))

@@ -11,8 +11,8 @@ from covista_service.bench.scene import views
 from covista_service.bench.threads import one_thread
 from covista_service.perception.agreement import DepthPoints, Observations, agree
 from covista_service.perception.camera import Floats, View, relative, undistort
-from covista_service.perception.matching import match
 from covista_service.perception.depths import Matched, observe
+from covista_service.perception.matching import match
 from covista_service.perception.scene import SceneOptions
 from covista_service.perception.surface import interpolate
 

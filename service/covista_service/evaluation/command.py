@@ -36,7 +36,7 @@ class MethodName(StrEnum):
 
 _DECIMALS = 3
 # Of a table that goes to a file or a pipe.
-_WIDTH = 110
+_WIDTH = 130
 
 
 def evaluate(
@@ -70,7 +70,7 @@ def evaluate(
         tuple(dict.fromkeys(method or [MethodName.AUTO])),
         input,
         FeatureKind(features),
-        _parse_noise(pose_noise),
+        parse_noise(pose_noise),
         seeds,
     )
     console = Console(stderr=True)
@@ -86,7 +86,8 @@ def evaluate(
         out.print(_table(evaluations))
 
 
-def _parse_noise(text: str) -> PoseNoise:
+def parse_noise(text: str) -> PoseNoise:
+    """DEG,SHARE as on the command line."""
     from covista_service.evaluation.noise import PoseNoise
 
     try:
@@ -129,7 +130,16 @@ def _table(evaluations: list[Evaluation]) -> Table:
     table = Table()
     for title in ("set", "method", "seed"):
         table.add_column(title, no_wrap=True)
-    for title in ("ordered pairs", "mean error", "where found", "rank order", "found", "ms per pair"):
+    for title in (
+        "ordered pairs",
+        "mean error",
+        "where found",
+        "rank order",
+        "found",
+        "in 90 %",
+        "width",
+        "ms per pair",
+    ):
         table.add_column(title, justify="right")
     for each in evaluations:
         found = each.metrics
@@ -139,7 +149,8 @@ def _table(evaluations: list[Evaluation]) -> Table:
             str(each.seed),
             str(found.pairs),
             *(_figure(value) for value in (found.mae, found.mae_found, found.rank_correlation)),
-            "" if found.found_share is None else f"{found.found_share:.0%}",
+            *("" if share is None else f"{share:.0%}" for share in (found.found_share, found.interval_coverage)),
+            _figure(found.interval_width),
             _figure(found.ms_median),
         )
     return table

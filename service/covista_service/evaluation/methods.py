@@ -13,6 +13,7 @@ from covista_service.evaluation.case import NO_CAMERA, NO_DEPTH, Answer, Case, P
 from covista_service.evaluation.dense_method import dense, dense_at_jumps
 from covista_service.perception import frustum
 from covista_service.perception.camera import Floats, View
+from covista_service.perception.certainty import Found
 from covista_service.perception.scene import SceneOptions, reconstruct
 from covista_service.perception.survey import Outcome, Survey
 
@@ -68,17 +69,18 @@ def _surfaces(views: Sequence[View], pairs: Sequence[Pair]) -> dict[Pair, Answer
     """Every pair costs its share of what all keyframes together took."""
     start = time.perf_counter_ns()
     scene = reconstruct(views, pairs, SceneOptions())
-    overlaps = {pair: scene.overlap(*pair) for pair in pairs}
+    found = {(a, b): (scene.found(a, b), scene.found(b, a)) for a, b in pairs}
     ms = (time.perf_counter_ns() - start) / 1e6 / max(len(pairs), 1)
-    return {pair: _surface(overlaps[pair], scene.matched.get(pair, 0), ms) for pair in pairs}
+    return {pair: _surface(*found[pair], scene.matched.get(pair, 0), ms) for pair in pairs}
 
 
-def _surface(overlaps: tuple[float, float] | None, matched: int, ms: float) -> Answer:
-    if overlaps is None:
+def _surface(a: Found | None, b: Found | None, matched: int, ms: float) -> Answer:
+    if a is None or b is None:
         return NO_DEPTH
+    said = (a.overlap, b.overlap, a.interval, b.interval)
     if matched:
-        return Answer("image", "measured", *overlaps, inliers=matched, ms=ms)
-    return Answer("predicted", "predicted", *overlaps, ms=ms)
+        return Answer("image", "measured", *said, inliers=matched, ms=ms)
+    return Answer("predicted", "predicted", *said, ms=ms)
 
 
 def _planes(found: Survey, ms: float) -> Answer:

@@ -16,7 +16,8 @@ class Metrics:
     """Figures of one method on one set; None where there is nothing to compute them from.
 
     An overlap without an answer counts as 0 in `mae` and `rank_correlation` (Spearman), and is left out of
-    `mae_found`; `found_share` is the share that has an answer.
+    `mae_found`; `found_share` is the share that has an answer. `interval_coverage` is the share of intervals that hold
+    the truth, `interval_width` their mean width.
     """
 
     pairs: int
@@ -25,6 +26,7 @@ class Metrics:
     rank_correlation: float | None
     found_share: float | None
     interval_coverage: float | None
+    interval_width: float | None
     ms_median: float | None
 
 
@@ -45,6 +47,7 @@ def measure(truth: Floats, answers: Floats, low: Floats, high: Floats, ms: Float
         rank_correlation=_rank_correlation(truth, given),
         found_share=_mean(found),
         interval_coverage=_mean(inside[bounded]),
+        interval_width=_mean((high - low)[bounded]),
         ms_median=float(np.median(ms)) if len(ms) else None,
     )
 

@@ -84,6 +84,18 @@ def evaluate(dataset: Dataset, options: RunOptions, advance: Callable[[], None] 
             advance()
 
 
+def viewed(
+    dataset: Dataset, options: RunOptions, advance: Callable[[], None] = lambda: None
+) -> Iterator[tuple[PoseNoise, tuple[View, ...]]]:
+    """The views of a set with poses as they are, then with each seed's errors; none of a set without cameras."""
+    extracted = _extracted(dataset, options, advance)
+    trials = [(NO_NOISE, 0)] + [(options.noise, seed) for seed in range(options.seeds) if not options.noise.is_none]
+    for noise, seed in trials:
+        views = _views(dataset, _poses(dataset, noise, np.random.default_rng(seed)), extracted)
+        if views is not None:
+            yield noise, views
+
+
 def steps(dataset: Dataset, options: RunOptions) -> int:
     """How often `evaluate` calls `advance`: for an image, a pair surveyed or left alone, and a method that is done."""
     surveyed = len(dataset.pairs) if _has_cameras(dataset) else 0

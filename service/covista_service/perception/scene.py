@@ -13,10 +13,12 @@ from scipy.sparse.csgraph import connected_components
 from covista_service.perception.adjustment import AdjustmentOptions, Link, Sighted, adjust
 from covista_service.perception.agreement import AgreementOptions, DepthPoints, Observations, agree
 from covista_service.perception.camera import Floats, Pose, View, relative, undistort
+from covista_service.perception.certainty import CertaintyOptions, Found, find
 from covista_service.perception.comparison import Comparison, ComparisonOptions, compare
 from covista_service.perception.depths import DepthOptions, Matched, observe
+from covista_service.perception.scales import ratio_range, scale_sigmas
 from covista_service.perception.surface import Surface, SurfaceOptions, flat, interpolate
-from covista_service.perception.visibility import Seeing, VisibilityOptions, seen
+from covista_service.perception.visibility import SAME_SCALE, Seeing, VisibilityOptions
 
 Pair = tuple[int, int]
 Motion = tuple[Floats, Floats]
@@ -34,6 +36,7 @@ class SceneOptions:
     agreement: AgreementOptions = field(default_factory=AgreementOptions)
     surface: SurfaceOptions = field(default_factory=SurfaceOptions)
     visibility: VisibilityOptions = field(default_factory=VisibilityOptions)
+    certainty: CertaintyOptions = field(default_factory=CertaintyOptions)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,13 +93,15 @@ class Settled:
 class Scene:
     """`settled` keyframes, and the matched points behind each pair's depths.
 
-    `parts` (n,): keyframes of one part are connected by matches, so that their depths have one scale.
+    `parts` (n,): keyframes of one part are connected by matches, so that their depths have one scale, which is known to
+    a factor of exp(+-`scale_sigmas`).
     """
 
     views: tuple[View, ...]
     settled: tuple[Settled, ...]
     matched: Mapping[Pair, int]
     parts: NDArray[np.int64]
+    scale_sigmas: Floats
     options: SceneOptions
 
     @property
@@ -121,16 +126,26 @@ class Scene:
 
     def overlap(self, i: int, j: int) -> tuple[float, float] | None:
         """q_i and q_j of Eq. 16, None where a surface is missing."""
+        forth, back = self.found(i, j), self.found(j, i)
+        return None if forth is None or back is None else (forth.overlap, back.overlap)
+
+    def found(self, i: int, j: int) -> Found | None:
+        """What j sees of i's image and how sure that is; None where a surface is missing."""
         one, other = self.surfaces[i], self.surfaces[j]
         if one is None or other is None:
             return None
-        rotation, translation = relative(self.poses[i], self.poses[j])
-        first, second = Seeing(self.views[i].camera, one), Seeing(self.views[j].camera, other)
-        connected = bool(self.parts[i] == self.parts[j])
-        options = self.options.visibility
-        forth = seen(first, second, rotation, translation, options, connected=connected)
-        back = seen(second, first, rotation.T, -rotation.T @ translation, options, connected=connected)
-        return float(forth.mean()), float(back.mean())
+        options, ratios = self.options, SAME_SCALE
+        if self.parts[i] != self.parts[j]:
+            ratios = ratio_range(self.scale_sigmas[i], self.scale_sigmas[j], options.visibility.scale_sigmas)
+        return find(
+            Seeing(self.views[i].camera, one),
+            Seeing(self.views[j].camera, other),
+            *relative(self.poses[i], self.poses[j]),
+            options.visibility,
+            options.certainty,
+            matched=bool(self.matched.get((i, j)) or self.matched.get((j, i))),
+            ratios=ratios,
+        )
 
 
 def reconstruct(views: Sequence[View], pairs: Sequence[Pair], options: SceneOptions) -> Scene:
@@ -138,7 +153,8 @@ def reconstruct(views: Sequence[View], pairs: Sequence[Pair], options: SceneOpti
     evidence = {(i, j): Evidence.of(compare(views[i], views[j], options.comparison)) for i, j in pairs}
     settled, evidence = settle([Sight(view, view.pose) for view in views], evidence, options)
     matched = {pair: said.matched for pair, said in evidence.items()}
-    return Scene(tuple(views), tuple(settled), matched, _parts(len(views), matched), options)
+    parts = _parts(len(views), matched)
+    return Scene(tuple(views), tuple(settled), matched, parts, _scale_sigmas(settled, parts, options), options)
 
 
 def settle(
@@ -238,6 +254,13 @@ def _median(sight: Sight, points: DepthPoints, options: SceneOptions) -> float |
     if len(points) >= options.least_points:
         return float(np.median(points.inverse_depths))
     return None if sight.former is None else float(np.median(sight.former.inverse_depth))
+
+
+def _scale_sigmas(settled: Sequence[Settled], parts: NDArray[np.int64], options: SceneOptions) -> Floats:
+    centres = np.array([one.pose.centre_m for one in settled]).reshape(-1, 3)
+    surfaces = [one.surface for one in settled]
+    depths = np.array([np.nan if one is None else 1 / np.median(one.inverse_depth) for one in surfaces])
+    return scale_sigmas(centres, depths, parts, options.adjustment.position_share)
 
 
 def _parts(count: int, matched: Mapping[Pair, int]) -> NDArray[np.int64]:

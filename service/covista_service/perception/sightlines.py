@@ -256,9 +256,7 @@ def _margin_px(u: float, v: float, cell_px: Floats) -> float:
 
 
 @compiled
-def _median_ratio(
-    forms: Floats, spans: NDArray[np.int64], rho: Floats, other_rho: Floats, found: Floats
-) -> float:
+def _median_ratio(forms: Floats, spans: NDArray[np.int64], rho: Floats, other_rho: Floats, found: Floats) -> float:
     """Median of the first surface's inverse depths over the second's, where they meet; 1 if nowhere."""
     met = 0
     for r in range(ROWS):

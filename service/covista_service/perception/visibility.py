@@ -97,7 +97,9 @@ def seen(
     the scales of their depths may have.
     """
     pair = np.array([[0, 1]])
-    masks = seen_masks(Gallery.of((first, second)), pair, rotation[None], translation[None], np.array([ratios]), options)
+    masks = seen_masks(
+        Gallery.of((first, second)), pair, rotation[None], translation[None], np.array([ratios]), options
+    )
     return np.asarray(masks[0], np.bool_)
 
 

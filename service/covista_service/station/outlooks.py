@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
+from covista_service.perception.adjustment import AdjustmentOptions
 from covista_service.perception.agreement import Observations
 from covista_service.perception.camera import Pose, View, relative
+from covista_service.perception.scales import ratio_range, scale_sigmas
 from covista_service.perception.scene import Evidence, Settled, Sight
 from covista_service.perception.surface import Surface, SurfaceOptions
-from covista_service.perception.visibility import Mask, Seeing, VisibilityOptions, seen
+from covista_service.perception.visibility import SAME_SCALE, Mask, Seeing, VisibilityOptions, seen
 from covista_service.perception.warp import warped
 from covista_service.station.events import BuildSurfaces, Keyframe, KeyframeId, SurfacesBuilt
 
@@ -24,6 +28,8 @@ _WINDOW = 4
 _LEAST_BASELINE, _BEST_BASELINE, _MOST_BASELINE = 0.02, 0.1, 0.4
 
 Names = tuple[KeyframeId, KeyframeId]
+# Least and greatest ratio of the scales of two keyframes' depths.
+Ratios = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -145,24 +151,17 @@ class Outlooks:
         taken = [self._take(name, event.settled[k], matched.get(k, {})) for k, name in opened]
         return [keyframe for keyframe in taken if keyframe is not None]
 
-    def connected(self) -> dict[str, int]:
-        """The part that each robot belongs to: those of one part are connected by matches."""
-        parts: dict[str, int] = {}
-        joined: dict[str, set[str]] = {robot: set() for robot in self._studies}
-        for outlook in self:
-            for other in outlook.matched:
-                if other.robot in joined:
-                    joined[outlook.keyframe.id.robot].add(other.robot)
-                    joined[other.robot].add(outlook.keyframe.id.robot)
-        for robot in joined:
-            reached = [] if robot in parts else [robot]
-            number = len(parts)
-            while reached:
-                one = reached.pop()
-                if one not in parts:
-                    parts[one] = number
-                    reached.extend(joined[one])
-        return parts
+    def scales(self) -> Scales:
+        """Which robots' depths have one scale, and how well each is known."""
+        outlooks = list(self)
+        index = {outlook.keyframe.id.robot: k for k, outlook in enumerate(outlooks)}
+        joined = [
+            (k, index[other.robot])
+            for k, outlook in enumerate(outlooks)
+            for other in outlook.matched
+            if other.robot in index
+        ]
+        return Scales(outlooks, joined)
 
     def forget(self, robot: str) -> None:
         """Drop a robot."""
@@ -269,15 +268,42 @@ def view_of(keyframe: Keyframe, pose: Pose) -> View:
     return View(keyframe.camera, pose, keyframe.features)
 
 
-def masks(first: Outlook, second: Outlook, *, connected: bool) -> tuple[Mask, Mask]:
+class Scales:
+    """The scale of every robot's depths: one for all that are connected by matches, if by way of others."""
+
+    def __init__(self, outlooks: Sequence[Outlook], joined: Sequence[tuple[int, int]]) -> None:
+        """`joined`: indices of outlooks that share matched points."""
+        ends = np.array(joined, np.int64).reshape(-1, 2)
+        count = len(outlooks)
+        graph = coo_array((np.ones(len(ends), np.int64), (ends[:, 0], ends[:, 1])), shape=(count, count))
+        parts = np.asarray(connected_components(graph, directed=False)[1], np.int64)
+        centres = np.array([outlook.pose.centre_m for outlook in outlooks]).reshape(-1, 3)
+        depths = np.array([_depth_m(outlook) for outlook in outlooks])
+        self._known = scale_sigmas(centres, depths, parts, AdjustmentOptions().position_share)
+        self._parts = parts
+        self._index = {outlook.keyframe.id.robot: k for k, outlook in enumerate(outlooks)}
+
+    def ratios(self, one: str, other: str) -> Ratios:
+        """Least and greatest ratio of two robots' scales."""
+        i, j = self._index[one], self._index[other]
+        if self._parts[i] == self._parts[j]:
+            return SAME_SCALE
+        return ratio_range(self._known[i], self._known[j], VisibilityOptions().scale_sigmas)
+
+
+def masks(first: Outlook, second: Outlook, ratios: Ratios) -> tuple[Mask, Mask]:
     """Which cells (ROWS, COLUMNS) of either image the other camera sees."""
     rotation, translation = relative(first.pose, second.pose)
     one, other = (Seeing(outlook.keyframe.camera, outlook.surface) for outlook in (first, second))
     options = VisibilityOptions()
     return (
-        seen(one, other, rotation, translation, options, connected=connected),
-        seen(other, one, rotation.T, -rotation.T @ translation, options, connected=connected),
+        seen(one, other, rotation, translation, options, ratios=ratios),
+        seen(other, one, rotation.T, -rotation.T @ translation, options, ratios=_inverse(ratios)),
     )
+
+
+def _inverse(ratios: Ratios) -> Ratios:
+    return 1 / ratios[1], 1 / ratios[0]
 
 
 def _own(study: _Study, keyframe: Keyframe) -> Surface | None:

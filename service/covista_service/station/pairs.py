@@ -7,9 +7,11 @@ from dataclasses import dataclass, replace
 
 from covista_schemas.reports import FoundBy
 
+from covista_service.perception.certainty import Interval
 from covista_service.perception.comparison import Comparison
+from covista_service.perception.visibility import SAME_SCALE
 from covista_service.station.events import Keyframe, KeyframeId, Pair
-from covista_service.station.outlooks import Outlook
+from covista_service.station.outlooks import Outlook, Ratios
 
 NOT_SURVEYED = "not_surveyed"
 FAILED = "failed"
@@ -19,7 +21,8 @@ FAILED = "failed"
 class Answer:
     """The overlap of a pair as last found, on which keyframes: `overlaps` are the shares of first's and second's.
 
-    `outlooks` are what it was read from; None if their views cannot meet. `connected`: by matches, if by way of others.
+    `intervals` hold the true shares in nine cases of ten. `outlooks` are what it was read from, None if their views
+    cannot meet, and `ratios` those that the scales of their depths may have.
     """
 
     overlaps: tuple[float, float]
@@ -27,8 +30,9 @@ class Answer:
     computed_ns: int
     first: Keyframe
     second: Keyframe
+    intervals: tuple[Interval, Interval] | None = None
     outlooks: tuple[Outlook, Outlook] | None = None
-    connected: bool = True
+    ratios: Ratios = SAME_SCALE
 
 
 @dataclass(frozen=True, slots=True, eq=False)

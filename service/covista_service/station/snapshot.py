@@ -11,12 +11,14 @@ from covista_schemas.reports import FoundBy, Status
 
 from covista_service.grouping.similarity import Floats
 from covista_service.perception.camera import Camera
+from covista_service.perception.certainty import Interval
 from covista_service.perception.comparison import Comparison
+from covista_service.perception.visibility import SAME_SCALE
 from covista_service.station.corrections import Correction
 from covista_service.station.events import Keyframe, KeyframeId, Pair
 from covista_service.station.ledger import Counts
 from covista_service.station.options import NS_PER_S, GroupingOptions
-from covista_service.station.outlooks import Outlook
+from covista_service.station.outlooks import Outlook, Ratios
 from covista_service.station.pairs import PairRecord, pair_of
 from covista_service.station.roster import Fix
 
@@ -65,8 +67,9 @@ class PairView:
     keyframe_b: Keyframe | None
     age_s: float | None
     explained: bool = False
+    intervals: tuple[Interval, Interval] | None = None
     outlooks: tuple[Outlook, Outlook] | None = None
-    connected: bool = True
+    ratios: Ratios = SAME_SCALE
 
     @property
     def inliers(self) -> int:
@@ -141,8 +144,9 @@ class Snapshot:
             answer.second,
             age_ns / NS_PER_S,
             record.explained,
+            answer.intervals,
             answer.outlooks,
-            answer.connected,
+            answer.ratios,
         )
 
     def pairs(self) -> Iterator[PairView]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from covista_schemas.reports import EventKind, FoundBy
 
@@ -22,12 +22,12 @@ from covista_service.station.events import (
 )
 from covista_service.station.groups import Groups
 from covista_service.station.options import StationOptions
-from covista_service.station.outlooks import Outlook, Outlooks, view_of
+from covista_service.station.outlooks import Outlook, Outlooks, Ratios, view_of
 from covista_service.station.pairs import Answer, Pairs, pair_of
 from covista_service.station.roster import Robot, Roster
 
-# The overlap of two outlooks now, which matches connect or do not.
-Read = Callable[[Outlook, Outlook, int, bool], Answer]
+# The overlap of an outlook with each of others, as `prospects.read` tells it.
+Read = Callable[[Outlook, Sequence[tuple[Outlook, Ratios]], int], list[Answer]]
 
 
 class Surveys:
@@ -40,7 +40,7 @@ class Surveys:
         self._pairs = pairs
         self._groups = groups
         self._capacity = options.capacity
-        self._overlap_of = read
+        self._overlaps_of = read
         self._agenda = Agenda(roster, pairs, options)
         self._outlooks = Outlooks()
         self._corrections = Corrections()
@@ -174,15 +174,13 @@ class Surveys:
 
     def _read(self, outlook: Outlook, now_ns: int) -> None:
         """Read the overlaps of a robot's outlook with those of all whose views may meet its own."""
-        robot, parts = outlook.keyframe.id.robot, self._outlooks.connected()
-        for other in sorted(self._agenda.partners(robot)):
-            beside = self._outlooks[other]
-            if beside is not None:
-                pair = pair_of(robot, other)
-                both = (outlook, beside) if pair[0] == robot else (beside, outlook)
-                answer = self._overlap_of(*both, now_ns, parts[robot] == parts[other])
-                self._pairs.enter(pair, answer)
-                self._groups.see(pair, self._pairs.overlaps(pair))
+        robot, scales = outlook.keyframe.id.robot, self._outlooks.scales()
+        beside = [self._outlooks[other] for other in sorted(self._agenda.partners(robot))]
+        others = [(other, scales.ratios(robot, other.keyframe.id.robot)) for other in beside if other is not None]
+        for answer in self._overlaps_of(outlook, others, now_ns):
+            pair = (answer.first.id.robot, answer.second.id.robot)
+            self._pairs.enter(pair, answer)
+            self._groups.see(pair, self._pairs.overlaps(pair))
 
     def _note(self, keyframe: KeyframeId) -> None:
         unseen = self._unseen.get(keyframe.robot, {}).pop(keyframe, None)

@@ -14,7 +14,8 @@ from tests.service.evaluation import recording
 APP = typer.Typer()
 APP.command()(evaluate)
 PAIR_FIELDS = {"a", "b", "overlap_a", "overlap_b", "interval_a", "interval_b", "found_by", "inliers", "planes", "ms"}
-METRICS = {"pairs", "mae", "mae_found", "rank_correlation", "found_share", "interval_coverage", "ms_median"}
+SHARES = {"rank_correlation", "found_share", "interval_coverage", "interval_width"}
+METRICS = {"pairs", "mae", "mae_found", "ms_median"} | SHARES
 
 
 def run(*arguments: str) -> Any:
@@ -48,6 +49,12 @@ def test_surfaces_are_the_default_and_hold_under_pose_noise(tmp_path: Path, give
     assert noisy["metrics"]["mae"] < 0.05
     assert {pair["found_by"] for pair in exact["pairs"]} == {"image"}
     assert all(pair["inliers"] > 50 for pair in exact["pairs"])
+    for pair in exact["pairs"]:
+        for side in "ab":
+            low, high = pair[f"interval_{side}"]
+            assert 0 <= low <= pair[f"overlap_{side}"] <= high <= 1
+    assert exact["metrics"]["interval_coverage"] > 0.8
+    assert exact["metrics"]["interval_width"] < 0.1
 
 
 def test_seeds_repeat_and_noise_is_told(tmp_path: Path) -> None:

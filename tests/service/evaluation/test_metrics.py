@@ -34,7 +34,9 @@ def test_order_alone_decides_the_rank_correlation() -> None:
 
 def test_coverage_is_over_the_answers_with_an_interval() -> None:
     low, high = np.array([0.0, 0.5, np.nan, 0.8]), np.array([0.2, 0.6, np.nan, 0.9])
-    assert measure(TRUTH, TRUTH, low, high, np.ones(1)).interval_coverage == pytest.approx(2 / 3)
+    found = measure(TRUTH, TRUTH, low, high, np.ones(1))
+    assert found.interval_coverage == pytest.approx(2 / 3)
+    assert found.interval_width == pytest.approx(0.4 / 3)
 
 
 @pytest.mark.parametrize("truth", [np.zeros(0), np.array([1.0]), np.array([0.7, 0.7])])

@@ -4,10 +4,13 @@ from covista_service.perception.camera import Camera, Floats, Pose, relative, re
 from covista_service.perception.frustum import overlap
 from covista_service.perception.surface import COLUMNS, ROWS, Surface, cell_centres, flat
 from covista_service.perception.visibility import (
+    CLUES,
+    SAME_SCALE,
     Gallery,
     Mask,
     Seeing,
     VisibilityOptions,
+    looks,
     seen,
     seen_masks,
     seen_shares,
@@ -16,11 +19,18 @@ from covista_service.perception.visibility import (
 from tests.service.perception.scenes import CAMERA, ORIGIN, turn
 
 OPTIONS = VisibilityOptions()
+ANY_RATIO = (1e-4, 1e4)
 FAR = Seeing(CAMERA, flat(1 / 6, 0.01))
 
 
-def share(first: Seeing, second: Seeing, first_pose: Pose, second_pose: Pose, connected: bool = True) -> float:
-    return float(seen(first, second, *relative(first_pose, second_pose), OPTIONS, connected=connected).mean())
+def share(
+    first: Seeing,
+    second: Seeing,
+    first_pose: Pose,
+    second_pose: Pose,
+    ratios: tuple[float, float] = SAME_SCALE,
+) -> float:
+    return float(seen(first, second, *relative(first_pose, second_pose), OPTIONS, ratios=ratios).mean())
 
 
 def at(x: float, y: float = 0.0, z: float = 0.0, rotation: Floats | None = None) -> Pose:
@@ -66,7 +76,28 @@ def test_tiny_baselines_hide_nothing() -> None:
 def test_unconnected_scales_are_taken_out() -> None:
     other = Seeing(CAMERA, flat(1 / 3, 0.01))
     assert share(FAR, other, ORIGIN, at(1.0)) == 0
-    assert share(FAR, other, ORIGIN, at(1.0), connected=False) > 0.7
+    assert share(FAR, other, ORIGIN, at(1.0), ANY_RATIO) > 0.7
+
+
+def test_a_wall_is_not_taken_for_another_scale() -> None:
+    """No more of a ratio is taken out than scales can be off by."""
+    near = Seeing(CAMERA, flat(1 / 2, 0.01))
+    assert share(FAR, near, ORIGIN, at(1.0), ANY_RATIO) > 0.7
+    assert share(FAR, near, ORIGIN, at(1.0), (0.8, 1.25)) == 0
+
+
+def test_clues_say_what_may_be_wrong() -> None:
+    """Two walls that differ by 3 % are apart by so much wherever both see them, and nothing is hidden."""
+    nearer = Seeing(CAMERA, flat(1.03 / 6, 0.01))
+    pairs, scales = np.array([[0, 1]]), np.array([SAME_SCALE])
+    found = looks(Gallery.of((FAR, nearer)), pairs, *relatives([ORIGIN, at(1.0)], pairs), scales, OPTIONS)
+    clues = dict(zip(CLUES, found.clues[0], strict=True))
+    assert clues["apart"] == pytest.approx(found.shares[0] * (1 - 1 / 1.03), rel=1e-6)
+    assert (clues["before"], clues["hidden"]) == (0, 0)
+    # A strip of 5 % on each side of the border that the view crosses, its cells counting less towards its end; and
+    # of those seen also the strips along the other three borders.
+    assert 0.015 < clues["outer_edge"] < 0.035
+    assert clues["inner_edge"] > 2 * clues["outer_edge"]
 
 
 CAMERAS = (CAMERA, Camera(np.array([[300.0, 2.0, 150], [0, 310.0, 130], [0, 0, 1]]), 320, 240))
@@ -96,7 +127,9 @@ def bilinear(grid: Floats, x: Floats, y: Floats) -> Floats:
     return np.asarray((1 - y) * upper + y * lower, np.float64)
 
 
-def by_the_book(first: Seeing, second: Seeing, rotation: Floats, translation: Floats, connected: bool) -> Mask:
+def by_the_book(
+    first: Seeing, second: Seeing, rotation: Floats, translation: Floats, ratios: tuple[float, float]
+) -> Mask:
     """Point by point: into the second image, and back from either surface into the first."""
     pixels, size = cell_centres(first.camera), np.array([second.camera.width, second.camera.height])
     rays = np.column_stack((pixels, np.ones(len(pixels)))) @ first.camera.rays_from_pixels.T
@@ -108,7 +141,7 @@ def by_the_book(first: Seeing, second: Seeing, rotation: Floats, translation: Fl
     seen[seen] = inside
     cell = at[inside] * (COLUMNS, ROWS) / size
     here, there = 1 / points[seen, 2], bilinear(second.surface.inverse_depth, *(cell - 0.5).T)
-    if connected:
+    if ratios == SAME_SCALE:
         nearer = second.camera.rays_from_pixels @ np.column_stack((at[inside] - 0.5, np.ones(len(here)))).T / there
         back = (nearer.T - translation) @ rotation @ first.camera.matrix.T
         parallax = np.linalg.norm(back[:, :2] / back[:, 2:] - pixels[seen], axis=1)
@@ -117,36 +150,39 @@ def by_the_book(first: Seeing, second: Seeing, rotation: Floats, translation: Fl
         limit = 1 - OPTIONS.tolerance - second.surface.sigma[row, column]
         seen[seen] = (here >= there * limit) | (parallax <= OPTIONS.parallax_px)
     elif len(here):
-        seen[seen] = here >= there * np.median(here / there) * (1 - OPTIONS.unconnected_tolerance)
+        ratio = np.clip(np.median(here / there), *ratios)
+        seen[seen] = here >= there * ratio * (1 - OPTIONS.unconnected_tolerance)
     return seen.reshape(ROWS, COLUMNS)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_many_pairs_at_once_are_the_same_as_each_alone(seed: int) -> None:
     seeings, poses, pairs = swarm(seed)
-    connected = np.random.default_rng(seed).random(len(pairs)) < 0.5
-    found = (Gallery.of(seeings), pairs, *relatives(poses, pairs), connected, OPTIONS)
+    kinds = np.array([SAME_SCALE, ANY_RATIO, (0.9, 1.2)])
+    ratios = kinds[np.random.default_rng(seed).integers(0, 3, len(pairs))]
+    found = (Gallery.of(seeings), pairs, *relatives(poses, pairs), ratios, OPTIONS)
     shares, masks = seen_shares(*found), seen_masks(*found)
     assert (shares == masks.mean(axis=(1, 2))).all()
+    assert (shares == looks(*found).shares).all()
     assert 0 < shares.mean() < 1
     for k, (i, j) in enumerate(pairs):
-        alone = seen(seeings[i], seeings[j], found[2][k], found[3][k], OPTIONS, connected=bool(connected[k]))
+        alone = seen(seeings[i], seeings[j], found[2][k], found[3][k], OPTIONS, ratios=tuple(ratios[k]))
         assert (masks[k] == alone).all()
 
 
-@pytest.mark.parametrize("connected", [True, False])
-def test_cells_are_seen_as_point_by_point(connected: bool) -> None:
+@pytest.mark.parametrize("ratios", [SAME_SCALE, ANY_RATIO, (0.9, 1.2)])
+def test_cells_are_seen_as_point_by_point(ratios: tuple[float, float]) -> None:
     seeings, poses, pairs = swarm(7)
     found = relatives(poses, pairs)
-    masks = seen_masks(Gallery.of(seeings), pairs, *found, np.full(len(pairs), connected), OPTIONS)
+    masks = seen_masks(Gallery.of(seeings), pairs, *found, np.full((len(pairs), 2), ratios), OPTIONS)
     for mask, (i, j), rotation, translation in zip(masks, pairs, *found, strict=True):
         # A point on the border of an image or of a tolerance may be rounded to either side.
-        assert (mask != by_the_book(seeings[i], seeings[j], rotation, translation, connected)).sum() <= 1
+        assert (mask != by_the_book(seeings[i], seeings[j], rotation, translation, ratios)).sum() <= 1
 
 
 def test_no_pairs_have_no_shares() -> None:
     seeings, poses, _ = swarm(0, 2)
     none = np.zeros((0, 2), np.intp)
-    found = (Gallery.of(seeings), none, *relatives(poses, none), np.zeros(0, np.bool_), OPTIONS)
+    found = (Gallery.of(seeings), none, *relatives(poses, none), np.zeros((0, 2)), OPTIONS)
     assert seen_shares(*found).shape == (0,)
     assert seen_masks(*found).shape == (0, ROWS, COLUMNS)

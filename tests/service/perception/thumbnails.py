@@ -79,7 +79,7 @@ def scene(
     agreed = [_agreed(walls, pose, random.uniform((0, 0), (639, 479), (points, 2))) for pose in poses]
     surfaces = [interpolate(one, CAMERA, SceneOptions().surface) if points else None for one in agreed]
     settled = [Settled(*one) for one in zip(poses, surfaces, agreed, strict=True)]
-    return Scene(tuple(views), tuple(settled), {}, np.zeros(len(poses), np.int64), SceneOptions())
+    return Scene(tuple(views), tuple(settled), {}, np.zeros(len(poses), np.int64), np.zeros(len(poses)), SceneOptions())
 
 
 def _agreed(walls: Sequence[Wall], pose: Pose, px: Floats) -> DepthPoints:

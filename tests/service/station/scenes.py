@@ -1,6 +1,6 @@
 """A station with hands that answer at once, and rovers that look at a wall."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -32,7 +32,7 @@ from covista_service.station.events import (
     Tick,
 )
 from covista_service.station.options import StationOptions
-from covista_service.station.outlooks import Outlook
+from covista_service.station.outlooks import Outlook, Ratios
 from covista_service.station.pairs import Answer
 from covista_service.station.snapshot import Snapshot
 from covista_service.station.station import Station
@@ -193,10 +193,13 @@ class Scene:
             self.shares[pair] = found.shares
         return self.receive(SurveyDone(job.first, job.second, None if found is None else found.comparison))
 
-    def _read(self, first: Outlook, second: Outlook, now_ns: int, connected: bool) -> Answer:
-        answer = prospects.read(first, second, now_ns, connected)
-        shares = self.shares.get((first.keyframe.id.robot, second.keyframe.id.robot))
-        return answer if shares is None else replace(answer, overlaps=shares)
+    def _read(self, outlook: Outlook, others: Sequence[tuple[Outlook, Ratios]], now_ns: int) -> list[Answer]:
+        answers = prospects.read(outlook, others, now_ns)
+        shares = [self.shares.get((answer.first.id.robot, answer.second.id.robot)) for answer in answers]
+        return [
+            answer if said is None else replace(answer, overlaps=said)
+            for answer, said in zip(answers, shares, strict=True)
+        ]
 
     @property
     def snapshot(self) -> Snapshot:
