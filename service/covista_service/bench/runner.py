@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import chain
 
-from covista_service.bench import dense, latency, predict_surfaces, surface, survey
+from covista_service.bench import dense, latency, planes, predict_planes, predict_surfaces, surface, survey
 from covista_service.bench.row import Row
 
 Bench = Callable[[bool], Iterator[Row]]
 # What makes up each of them, in order.
 BENCHES: Mapping[str, Sequence[Bench]] = {
     "survey": (survey.rows, surface.rows, dense.rows),
-    "predict": (predict_surfaces.rows,),
+    "planes": (planes.rows,),
+    "predict": (predict_planes.rows, predict_surfaces.rows),
     "latency": (latency.rows,),
 }
 

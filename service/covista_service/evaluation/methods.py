@@ -84,12 +84,12 @@ def _surface(a: Found | None, b: Found | None, matched: int, ms: float) -> Answe
 
 
 def _planes(found: Survey, ms: float) -> Answer:
-    measured = found.outcome is Outcome.MEASURED
+    measured = found.overlap_first is not None
     return Answer(
         found_by="image" if measured else "unknown",
         outcome=str(found.outcome),
-        overlap_a=found.overlap_first if measured else None,
-        overlap_b=found.overlap_second if measured else None,
+        overlap_a=found.overlap_first,
+        overlap_b=found.overlap_second,
         inliers=found.inliers,
         planes=len(found.planes),
         ms=ms,

@@ -16,7 +16,10 @@ from covista_service.perception.sightings import Sightings
 
 
 class Outcome(StrEnum):
-    """What comparing the images of a pair, or a survey of its planes, came to. Only `measured` carries an overlap."""
+    """What comparing the images of a pair, or surveying its planes, came to. `measured` carries planes and an overlap.
+
+    `no_parallax` carries no planes, and an overlap if all points are where far ones would be: then depth is no matter.
+    """
 
     MEASURED = "measured"
     FEW_MATCHES = "few_matches"
@@ -74,12 +77,17 @@ def compare(first: View, second: View, options: ComparisonOptions) -> Comparison
     matches = np.zeros((0, 2), np.int64)
     if comparable:
         matches = match(first.features, second.features, options.matching).astype(np.int64)
-    sightings = Sightings(
+    sightings = sighted(first, second, matches)
+    reported = relative(first.pose, second.pose)
+    pose = relative_pose(sightings, *reported, options.pose, options.seed)
+    return Comparison(comparable, matches, sightings, pose, len(matches) >= options.min_matches)
+
+
+def sighted(first: View, second: View, matches: NDArray[np.int64]) -> Sightings:
+    """Matches (k, 2) of two keyframes, lens distortion taken out."""
+    return Sightings(
         first.camera,
         second.camera,
         undistort(first.camera, first.features.keypoints_px[matches[:, 0]]),
         undistort(second.camera, second.features.keypoints_px[matches[:, 1]]),
     )
-    reported = relative(first.pose, second.pose)
-    pose = relative_pose(sightings, *reported, options.pose, options.seed)
-    return Comparison(comparable, matches, sightings, pose, len(matches) >= options.min_matches)

@@ -3,6 +3,8 @@
 Where the paper clusters points in space, these functions work where noise is uniform: a point is its ray (x, y, 1) in
 the first camera and its inverse depth rho, a plane is rho = c . (x, y, 1), and the distance (4) of a point from a plane
 is how far, in pixels, the plane would put it from where the second image shows it.
+
+Clouds are arrays (4, n) of x, y, rho and px per unit of inverse depth; weights and memberships are (K, n).
 """
 
 from __future__ import annotations
@@ -13,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from covista_service.perception.camera import Floats
+from covista_service.perception.compiled import compiled
+from covista_service.perception.seeding import initial_cells, robust_planes
 
 _TINY = 1e-12
 _RIDGE = 1e-9
-Cells = NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,16 +52,9 @@ class Points:
         return len(self.rays)
 
     @property
-    def place(self) -> Floats:
-        """Points (n, 3) as (x, y, rho)."""
-        return np.column_stack((self.rays[:, :2], self.inverse_depths))
-
-    @property
-    def moments(self) -> Floats:
-        """Products (n, 9): 1, x, y, rho, xx, xy, yy, x rho, y rho, each times the squared px per inverse depth."""
-        x, y, rho = self.place.T
-        products: Floats = np.column_stack((np.ones(len(self)), x, y, rho, x * x, x * y, y * y, x * rho, y * rho))
-        return products * (self.shifts_px**2)[:, None]
+    def cloud(self) -> Floats:
+        """Points (4, n) as x, y, rho and px per unit of inverse depth."""
+        return np.stack((self.rays[:, 0], self.rays[:, 1], self.inverse_depths, self.shifts_px))
 
     def distances(self, planes: Floats) -> Floats:
         """Distances (n, K) in px from planes c (K, 3): Eq. 4 as transfer error in the second image."""
@@ -66,121 +62,116 @@ class Points:
         return away
 
 
-def cluster(points: Points, options: FuzzyOptions, random: np.random.Generator) -> list[Floats]:
-    """Planes c (K, 3) that the points lie on, after each merging: from many down to those that are left at the end."""
-    planes = _robust_planes(points, initial_cells(points, options, random), options, random)
-    stages, moments = [planes], points.moments
-    memberships: Floats | None = noise_memberships(points.distances(planes), options)
-    while memberships is not None and memberships.shape[1]:
-        memberships, planes = _settle(points, moments, memberships, options)
-        stages.append(planes)
-        memberships = merge_most_similar(memberships)
-    return stages
+def cluster(cloud: Floats, options: FuzzyOptions, random: np.random.Generator) -> Floats:
+    """Planes c (K, 3) that the points of a cloud lie on, one after the other those after each merging."""
+    n = cloud.shape[1]
+    count = min(options.max_clusters, n // options.points_per_cluster)
+    cells = initial_cells(cloud, random.choice(n, count, replace=False), options.initial_iterations)
+    draws = random.random((count, options.triples, 3))
+    planes = robust_planes(cloud, cells, draws, options.delta_px)
+    return _stages(cloud, planes, options.floor, options.delta_px, options.iterations, options.settled)
 
 
-def initial_cells(points: Points, options: FuzzyOptions, random: np.random.Generator) -> Cells:
-    """The cell (n,) that fuzzy c-means (1), (2) with m = 2 puts each point in, by pixel and inverse depth."""
-    count = min(options.max_clusters, len(points) // options.points_per_cluster)
-    place = points.place
-    place = (place - place.mean(axis=0)) / (place.std(axis=0) + _TINY)
-    centres = place[random.choice(len(place), count, replace=False)]
-    for _ in range(options.initial_iterations):
-        weights = _fuzzy_memberships(_squared_gaps(place, centres)) ** 2
-        centres = (weights.T @ place) / (weights.sum(axis=0)[:, None] + _TINY)  # (1)
-    cells: Cells = _squared_gaps(place, centres).argmin(axis=1)
-    return cells
-
-
-def _robust_planes(points: Points, cells: Cells, options: FuzzyOptions, random: np.random.Generator) -> Floats:
-    """For each cell with enough points the plane c (K, 3) through three of them that most others of the cell lie near.
-
-    Least squares would let one outlier among a cell's few points spoil its first plane for good.
-    """
-    planes = []
-    for cell in np.unique(cells):
-        own = np.flatnonzero(cells == cell)
-        members = Points(points.rays[own], points.inverse_depths[own], points.shifts_px[own])
-        proposed = _through(members.place[random.integers(len(own), size=(options.triples, 3))])
-        if len(proposed):
-            away = members.distances(proposed)
-            planes.append(proposed[np.minimum(away, options.delta_px).sum(axis=0).argmin()])
-    return np.array(planes).reshape(-1, 3)
-
-
-def _through(triples: Floats) -> Floats:
-    """Planes c (k, 3) through triples (m, 3, 3) of points (x, y, rho), k <= m of which are not in line."""
-    (dx, dy, dr), (ex, ey, er) = (triples[:, 1] - triples[:, 0]).T, (triples[:, 2] - triples[:, 0]).T
-    area = dx * ey - dy * ex
-    fixed = np.abs(area) > _TINY
-    area = np.where(fixed, area, 1.0)
-    slope_x, slope_y = (dr * ey - er * dy) / area, (dx * er - ex * dr) / area
-    x, y, rho = triples[:, 0].T
-    planes: Floats = np.column_stack((slope_x, slope_y, rho - slope_x * x - slope_y * y))
-    kept: Floats = planes[fixed]
-    return kept
-
-
-def noise_memberships(distances: Floats, options: FuzzyOptions) -> Floats:
-    """Memberships (n, K) that minimise (5) with m = 2; what is missing to 1 belongs to the outlier cluster."""
-    closeness = np.maximum(distances, options.floor * options.delta_px) ** -2.0
-    memberships: Floats = closeness / (closeness.sum(axis=1) + options.delta_px**-2)[:, None]
+@compiled
+def noise_memberships(cloud: Floats, planes: Floats, floor: float, delta_px: float) -> Floats:
+    """Memberships (K, n) that minimise (5) with m = 2; what is missing to 1 belongs to the outlier cluster."""
+    least = floor * delta_px
+    memberships = np.empty((len(planes), cloud.shape[1]))
+    total = np.full(cloud.shape[1], delta_px**-2.0)
+    for k in range(len(planes)):
+        a, b, c = planes[k]
+        for i in range(cloud.shape[1]):
+            away = max(abs(a * cloud[0, i] + b * cloud[1, i] + c - cloud[2, i]) * cloud[3, i], least)  # (4)
+            memberships[k, i] = 1.0 / (away * away)
+            total[i] += memberships[k, i]
+    for k in range(len(planes)):
+        for i in range(cloud.shape[1]):
+            memberships[k, i] /= total[i]
     return memberships
 
 
-def fit(moments: Floats, weights: Floats) -> Floats:
-    """Planes c (K, 3) through points with `moments` (n, 9) and `weights` (n, K), least squares in px.
+@compiled
+def fit(cloud: Floats, weights: Floats) -> Floats:
+    """Planes c (K, 3) through a cloud with `weights` (K, n), least squares in px.
 
     The centre (1) and the covariance (3) of (x, y, rho) give it: noise lies along rho alone, so the plane holds the
     centre and has the slope that the covariance tells.
     """
-    sums = (weights.T @ moments).T
-    total, x, y, rho, xx, xy, yy, xr, yr = sums / (sums[0] + _TINY)  # (1): x, y, rho
-    xx, xy, yy, xr, yr = xx - x * x, xy - x * y, yy - y * y, xr - x * rho, yr - y * rho  # (3)
-    xx, yy = xx + _RIDGE * (xx + yy) + _TINY, yy + _RIDGE * (xx + yy) + _TINY
-    area = xx * yy - xy * xy
-    slope_x, slope_y = (xr * yy - yr * xy) / area, (yr * xx - xr * xy) / area
-    return np.column_stack((slope_x, slope_y, total * (rho - slope_x * x - slope_y * y)))
+    planes = np.empty((len(weights), 3))
+    for k in range(len(weights)):
+        total = x = y = rho = xx = xy = yy = xr = yr = 0.0
+        for i in range(cloud.shape[1]):
+            px, py, pr = cloud[0, i], cloud[1, i], cloud[2, i]
+            w = weights[k, i] * cloud[3, i] * cloud[3, i]
+            total += w
+            x, y, rho = x + w * px, y + w * py, rho + w * pr
+            xx, xy, yy = xx + w * px * px, xy + w * px * py, yy + w * py * py
+            xr, yr = xr + w * px * pr, yr + w * py * pr
+        share = 1.0 / (total + _TINY)
+        x, y, rho = x * share, y * share, rho * share  # (1)
+        xx, xy, yy = xx * share - x * x, xy * share - x * y, yy * share - y * y  # (3)
+        xr, yr = xr * share - x * rho, yr * share - y * rho
+        ridge = _RIDGE * (xx + yy) + _TINY
+        xx, yy = xx + ridge, yy + ridge
+        area = xx * yy - xy * xy
+        slope_x, slope_y = (xr * yy - yr * xy) / area, (yr * xx - xr * xy) / area
+        planes[k] = slope_x, slope_y, total * share * (rho - slope_x * x - slope_y * y)
+    return planes
 
 
-def merge_most_similar(memberships: Floats) -> Floats | None:
-    """Memberships (n, K - 1) with the two most similar clusters made one, or None if none are similar enough (6).
+@compiled
+def most_similar(memberships: Floats) -> tuple[int, int]:
+    """The two clusters with the largest inclusion (6), or (-1, -1) if none are similar enough.
 
     The threshold counts the outlier cluster, 1 / K for K planes: with 1 / (K - 1) two could never become one.
     """
-    count = memberships.shape[1]
-    if count < 2:
-        return None
-    sizes = memberships.sum(axis=0)
-    rows = np.ascontiguousarray(memberships.T)
-    shared = np.minimum(rows[:, None, :], rows[None, :, :]).sum(axis=2)
-    inclusion = shared / (np.minimum(sizes[:, None], sizes) + _TINY)
-    np.fill_diagonal(inclusion, -1.0)
-    one, other = np.unravel_index(int(inclusion.argmax()), inclusion.shape)
-    if inclusion[one, other] <= 1.0 / count:
-        return None
-    merged = np.delete(memberships, other, axis=1)
-    merged[:, one - (other < one)] = memberships[:, one] + memberships[:, other]
-    return merged
+    count = len(memberships)
+    pair, largest = (-1, -1), 1.0 / max(count, 1)
+    sizes = memberships.sum(axis=1)
+    for one in range(count):
+        for other in range(one):
+            shared = 0.0
+            for i in range(memberships.shape[1]):
+                shared += min(memberships[one, i], memberships[other, i])
+            inclusion = shared / (min(sizes[one], sizes[other]) + _TINY)
+            if inclusion > largest:
+                pair, largest = (other, one), inclusion
+    return pair
 
 
-def _settle(points: Points, moments: Floats, memberships: Floats, options: FuzzyOptions) -> tuple[Floats, Floats]:
-    """Turn by turn planes from memberships and memberships from planes, until little changes."""
-    for _ in range(options.iterations):
-        planes = fit(moments, memberships**2)
-        updated = noise_memberships(points.distances(planes), options)
-        change = np.abs(updated - memberships).max()
-        memberships = updated
-        if change < options.settled:
-            break
-    return memberships, planes
+@compiled
+def merged(memberships: Floats, one: int, other: int) -> Floats:
+    """Memberships (K - 1, n) with clusters one < other made one."""
+    rest = np.empty((len(memberships) - 1, memberships.shape[1]))
+    rest[:other] = memberships[:other]
+    rest[other:] = memberships[other + 1 :]
+    rest[one] += memberships[other]
+    return rest
 
 
-def _squared_gaps(place: Floats, centres: Floats) -> Floats:
-    gaps: Floats = ((place[:, None, :] - centres) ** 2).sum(axis=2)
-    return gaps
-
-
-def _fuzzy_memberships(squared: Floats) -> Floats:
-    closeness = 1.0 / (squared + _TINY)
-    memberships: Floats = closeness / closeness.sum(axis=1)[:, None]
-    return memberships
+@compiled
+def _stages(
+    cloud: Floats, planes: Floats, floor: float, delta_px: float, iterations: int, settled: float
+) -> NDArray[np.float64]:
+    """Planes at first and after each merging, of the two most similar at a time, until none are similar enough."""
+    count = len(planes)
+    stages = np.empty((count + count * (count + 1) // 2, 3))
+    stages[:count] = planes
+    filled = count
+    memberships = noise_memberships(cloud, planes, floor, delta_px)
+    one = 0
+    while one >= 0 and len(memberships):
+        # Turn by turn planes from memberships and memberships from planes, until little changes.
+        for _ in range(iterations):
+            planes = fit(cloud, memberships * memberships)
+            updated = noise_memberships(cloud, planes, floor, delta_px)
+            change = np.abs(updated - memberships).max()
+            memberships = updated
+            if change < settled:
+                break
+        stages[filled : filled + len(planes)] = planes
+        filled += len(planes)
+        one, other = most_similar(memberships)
+        if one >= 0:
+            memberships = merged(memberships, one, other)
+    return stages[:filled]

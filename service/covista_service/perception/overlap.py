@@ -11,7 +11,7 @@ from covista_service.perception.camera import Camera, Floats
 from covista_service.perception.polygon import Polygon
 
 # A camera closer to a plane than this share of the plane's distance from the other camera sees it edge-on.
-_EDGE_ON = 1e-9
+EDGE_ON = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,10 +77,10 @@ def inverse_depths_second(
     """
     centre = -rotation.T @ translation
     side = 1.0 + normals @ centre
-    edge_on = np.abs(side) < _EDGE_ON
+    edge_on = np.abs(side) < EDGE_ON
     scale = np.where(edge_on, 0.0, 1.0 / np.where(edge_on, 1.0, side))
     rho = -(normals @ rotation.T) * scale[:, None] @ second.rays_from_pixels
-    return rho, (side >= _EDGE_ON).tolist()
+    return rho, (side >= EDGE_ON).tolist()
 
 
 def _conditions(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from covista_service.perception.camera import Camera, Floats, View
 from covista_service.perception.comparison import Comparison, ComparisonOptions, compare
 from covista_service.perception.comparison import Outcome as Outcome
+from covista_service.perception.epipolar import homogeneous, transfer_errors
 from covista_service.perception.fuzzy import Points
 from covista_service.perception.matching import MatchingOptions
 from covista_service.perception.overlap import CommonField, common_field, inverse_depths_second
@@ -19,6 +20,9 @@ from covista_service.perception.relative_pose import PoseSource, RelativePose
 from covista_service.perception.sightings import Sightings
 from covista_service.perception.territories import Marks, TerritoryOptions, territories
 from covista_service.perception.triangulation import Triangulation, TriangulationOptions, triangulate
+
+# Of the points that agree with a pose without parallax, as many must be where far points would be.
+_FAR_SHARE = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +37,7 @@ class Plane:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Survey:
-    """What a survey found; overlaps are q_1 and q_2 of Eq. 16, None unless measured.
+    """What a survey found; overlaps are q_1 and q_2 of Eq. 16, None unless measured or without any parallax.
 
     `rotation`, `translation`: X_2 = R X_1 + t as used. Points: inlier keypoints of both images (k, 2) in ideal px,
     with their depths Z (k,) in each camera, and the plane index (k,) of each, -1 for none.
@@ -98,7 +102,7 @@ def explain(
     sightings = sightings.only(pose.inliers)
     triangulated = triangulate(sightings, pose.rotation, pose.translation, options.triangulation)
     if triangulated.kept.sum() < options.planes.min_support:
-        return replace(found, outcome=Outcome.NO_PARALLAX)
+        return _without_parallax(sightings, found, options.comparison.pose.inlier_px)
     found = _with_points(found, sightings, triangulated)
 
     # "Adaptive fuzzy plane clustering": Eqs. 1 to 6.
@@ -110,7 +114,7 @@ def explain(
     found = replace(found, plane_of_point=planes.labels)
 
     # "Projecting the visible region of one camera on the planes and then on the image plane of another camera."
-    orders = _orders(first, second, found, planes, options.territories)
+    orders = shown(first, second, found, planes, options.territories)
     common = common_field(first, second, pose.rotation, pose.translation, planes.normals, orders)
     return _measured(found, planes, common)
 
@@ -124,6 +128,20 @@ def _with_pose(pose: RelativePose, matches: int) -> Survey:
         rotation=pose.rotation,
         translation=pose.translation,
     )
+
+
+def _without_parallax(sightings: Sightings, found: Survey, inlier_px: float) -> Survey:
+    """All is seen as though endlessly far away, on the plane 0 . X + 1 = 0, whose homography is K_2 R K_1^-1.
+
+    There is an overlap if that is where most points of the second image are.
+    """
+    first, second = sightings.first, sightings.second
+    found = replace(found, outcome=Outcome.NO_PARALLAX)
+    ends = homogeneous(sightings.first_px), homogeneous(sightings.second_px)
+    if (transfer_errors(first, second, found.rotation, *ends) < inlier_px).mean() < _FAR_SHARE:
+        return found
+    common = common_field(first, second, found.rotation, np.zeros(3), np.zeros((1, 3)))
+    return replace(found, overlap_first=common.overlap_first, overlap_second=common.overlap_second)
 
 
 def _with_points(found: Survey, sightings: Sightings, points: Triangulation) -> Survey:
@@ -143,7 +161,7 @@ def _known_planes(prior: Survey | None) -> Floats | None:
     return np.array([-plane.normal for plane in prior.planes])
 
 
-def _orders(
+def shown(
     first: Camera, second: Camera, found: Survey, planes: FoundPlanes, options: TerritoryOptions
 ) -> tuple[Floats, Floats]:
     """Which plane a pixel of either image shows, as rows (K, 3)."""

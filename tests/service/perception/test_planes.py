@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 from covista_service.perception.camera import Floats, relative
-from covista_service.perception.fuzzy import FuzzyOptions, Points, fit, merge_most_similar, noise_memberships
-from covista_service.perception.planes import FoundPlanes, PlaneOptions, description_length, find_planes
+from covista_service.perception.description import length
+from covista_service.perception.fuzzy import Points, fit, merged, most_similar, noise_memberships
+from covista_service.perception.planes import FoundPlanes, PlaneOptions, find_planes, neighbours, terms_of
 from covista_service.perception.triangulation import TriangulationOptions, triangulate
 
 from tests.service.perception.scenes import ORIGIN, Scene, beside, corner, plane, scene, wall
@@ -91,26 +92,47 @@ def test_a_fit_goes_through_exact_points() -> None:
     rays = np.column_stack((random.uniform(-0.5, 0.5, (30, 2)), np.ones(30)))
     truth = np.array([0.1, -0.05, 0.2])
     points = Points(rays, rays @ truth, random.uniform(100, 300, 30))
-    np.testing.assert_allclose(fit(points.moments, random.random((30, 1)))[0], truth, atol=1e-7)
+    np.testing.assert_allclose(fit(points.cloud, random.random((1, 30)))[0], truth, atol=1e-7)
 
 
 def test_memberships_and_the_outliers_share_make_one() -> None:
-    options = FuzzyOptions(delta_px=2.0)
-    memberships = noise_memberships(np.array([[2.0, 1e6], [1e6, 1e6], [0.0, 1e6]]), options)
-    np.testing.assert_allclose(memberships.sum(axis=1), [0.5, 0.0, 0.8], atol=1e-6)
+    off_px = np.array([2.0, 1e6, 0.0])
+    cloud = np.array([[0.0, 0.1, 0.2], [0.0, 0.3, 0.1], off_px / 100, [100.0, 100.0, 100.0]])
+    planes = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1e6]])
+    memberships = noise_memberships(cloud, planes, 0.5, 2.0)
+    np.testing.assert_allclose(memberships.sum(axis=0), [0.5, 0.0, 0.8], atol=1e-6)
 
 
 def test_two_clusters_can_become_one_and_strangers_stay_apart() -> None:
-    alike = np.full((20, 2), 0.5)
-    merged = merge_most_similar(alike)
-    assert merged is not None
-    np.testing.assert_allclose(merged, 1.0)
-    assert merge_most_similar(np.repeat(np.eye(2), 10, axis=0)) is None
-    assert merge_most_similar(np.ones((5, 1))) is None
+    alike = np.full((2, 20), 0.5)
+    assert most_similar(alike) == (0, 1)
+    np.testing.assert_allclose(merged(alike, 0, 1), 1.0)
+    assert most_similar(np.repeat(np.eye(2), 10, axis=1)) == (-1, -1)
+    assert most_similar(np.ones((1, 5))) == (-1, -1)
+
+
+def test_merging_leaves_the_others_as_they_are() -> None:
+    memberships = np.random.default_rng(0).random((4, 7))
+    rest = merged(memberships, 1, 2)
+    np.testing.assert_array_equal(rest, [memberships[0], memberships[1] + memberships[2], memberships[3]])
 
 
 def test_a_true_plane_shortens_the_description() -> None:
     points, _ = cloud(scene(wall(), beside(), 200, 0.5, 0.2))
-    none, true = np.zeros((0, 3)), -wall()
-    assert description_length(points, true, OPTIONS) < description_length(points, none, OPTIONS)
-    assert description_length(points, true, OPTIONS) < description_length(points, np.vstack((true, true)), OPTIONS)
+    none, true, twice = np.zeros((0, 3)), -wall(), np.vstack((-wall(), -wall()))
+    beside_each = neighbours(points, OPTIONS.neighbours)
+    lengths = [length(points.cloud, beside_each, one, terms_of(1.0, OPTIONS)) for one in (none, true, twice)]
+    assert lengths[1] < min(lengths[0], lengths[2])
+
+
+def test_a_plane_of_scattered_points_is_dearer_than_one_of_neighbours() -> None:
+    random = np.random.default_rng(0)
+    place = random.uniform(-0.5, 0.5, (2, 200))
+    left, scattered = place[0] < 0, random.random(200) < 0.5
+    lengths = []
+    for on_one in (left, scattered):
+        rho = np.where(on_one, 0.2, 0.4)
+        points = Points(np.column_stack((*place, np.ones(200))), rho, np.full(200, 300.0))
+        planes = np.array([[0, 0, 0.2], [0, 0, 0.4]])
+        lengths.append(length(points.cloud, neighbours(points, 8), planes, terms_of(1.0, OPTIONS)))
+    assert lengths[0] < lengths[1] - 50
