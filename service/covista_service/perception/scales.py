@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from covista_service.perception.camera import Floats
 
 # Beyond e^9 either way any ratio will do.
 _ANY = 9.0
+
+
+def parts_of(count: int, joined: Sequence[tuple[int, int]]) -> NDArray[np.int64]:
+    """The part (count,) that each keyframe belongs to: those of one part are `joined` by matches, if by way of others.
+
+    Their depths have one scale.
+    """
+    ends = np.array(joined, np.int64).reshape(-1, 2)
+    graph = coo_array((np.ones(len(ends), np.int64), (ends[:, 0], ends[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], np.int64)
 
 
 def scale_sigmas(centres_m: Floats, depths_m: Floats, parts: NDArray[np.int64], position_share: float) -> Floats:

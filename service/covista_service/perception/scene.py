@@ -7,8 +7,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from covista_service.perception.adjustment import AdjustmentOptions, Link, Sighted, adjust
 from covista_service.perception.agreement import AgreementOptions, DepthPoints, Observations, agree
@@ -16,7 +14,7 @@ from covista_service.perception.camera import Floats, Pose, View, relative, undi
 from covista_service.perception.certainty import CertaintyOptions, Found, find
 from covista_service.perception.comparison import Comparison, ComparisonOptions, compare
 from covista_service.perception.depths import DepthOptions, Matched, observe
-from covista_service.perception.scales import ratio_range, scale_sigmas
+from covista_service.perception.scales import parts_of, ratio_range, scale_sigmas
 from covista_service.perception.surface import Surface, SurfaceOptions, flat, interpolate
 from covista_service.perception.visibility import SAME_SCALE, Seeing, VisibilityOptions
 
@@ -153,7 +151,7 @@ def reconstruct(views: Sequence[View], pairs: Sequence[Pair], options: SceneOpti
     evidence = {(i, j): Evidence.of(compare(views[i], views[j], options.comparison)) for i, j in pairs}
     settled, evidence = settle([Sight(view, view.pose) for view in views], evidence, options)
     matched = {pair: said.matched for pair, said in evidence.items()}
-    parts = _parts(len(views), matched)
+    parts = parts_of(len(views), [pair for pair, points in matched.items() if points])
     return Scene(tuple(views), tuple(settled), matched, parts, _scale_sigmas(settled, parts, options), options)
 
 
@@ -261,9 +259,3 @@ def _scale_sigmas(settled: Sequence[Settled], parts: NDArray[np.int64], options:
     surfaces = [one.surface for one in settled]
     depths = np.array([np.nan if one is None else 1 / np.median(one.inverse_depth) for one in surfaces])
     return scale_sigmas(centres, depths, parts, options.adjustment.position_share)
-
-
-def _parts(count: int, matched: Mapping[Pair, int]) -> NDArray[np.int64]:
-    joined = np.array([pair for pair, points in matched.items() if points], np.int64).reshape(-1, 2)
-    graph = coo_array((np.ones(len(joined), np.int64), (joined[:, 0], joined[:, 1])), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1], np.int64)

@@ -7,13 +7,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from covista_service.perception.adjustment import AdjustmentOptions
 from covista_service.perception.agreement import Observations
 from covista_service.perception.camera import Pose, View, relative
-from covista_service.perception.scales import ratio_range, scale_sigmas
+from covista_service.perception.scales import parts_of, ratio_range, scale_sigmas
 from covista_service.perception.scene import Evidence, Settled, Sight
 from covista_service.perception.surface import Surface, SurfaceOptions
 from covista_service.perception.visibility import SAME_SCALE, Mask, Seeing, VisibilityOptions, seen
@@ -273,10 +271,7 @@ class Scales:
 
     def __init__(self, outlooks: Sequence[Outlook], joined: Sequence[tuple[int, int]]) -> None:
         """`joined`: indices of outlooks that share matched points."""
-        ends = np.array(joined, np.int64).reshape(-1, 2)
-        count = len(outlooks)
-        graph = coo_array((np.ones(len(ends), np.int64), (ends[:, 0], ends[:, 1])), shape=(count, count))
-        parts = np.asarray(connected_components(graph, directed=False)[1], np.int64)
+        parts = parts_of(len(outlooks), joined)
         centres = np.array([outlook.pose.centre_m for outlook in outlooks]).reshape(-1, 3)
         depths = np.array([_depth_m(outlook) for outlook in outlooks])
         self._known = scale_sigmas(centres, depths, parts, AdjustmentOptions().position_share)
