@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from covista_service.evaluation import comparing
 from covista_service.evaluation.case import NO_CAMERA, NO_DEPTH, Answer, Case, Pair, connected
-from covista_service.evaluation.dense_method import dense, dense_at_jumps
+from covista_service.evaluation.surfaces import auto, dense, dense_at_jumps, surfaces
 from covista_service.perception import frustum
 from covista_service.perception.camera import Floats, View
-from covista_service.perception.certainty import Found
-from covista_service.perception.scene import SceneOptions, reconstruct
 from covista_service.perception.survey import Outcome, Survey
 
 Method = Callable[[Case], dict[Pair, Answer]]
@@ -38,18 +35,6 @@ def frustums(case: Case) -> dict[Pair, Answer]:
     }
 
 
-def surfaces(case: Case) -> dict[Pair, Answer]:
-    """A surface per keyframe from the features of all its pairs, with poses that agree across pairs."""
-    if case.views is None:
-        return dict.fromkeys(case.pairs, NO_CAMERA)
-    return _surfaces([replace(view, thumbnail=None) for view in case.views], case.pairs)
-
-
-def auto(case: Case) -> dict[Pair, Answer]:
-    """Surfaces, with the thumbnail's grey where there is one."""
-    return dict.fromkeys(case.pairs, NO_CAMERA) if case.views is None else _surfaces(case.views, case.pairs)
-
-
 METHODS: Mapping[str, Method] = {
     "auto": auto,
     "planes": planes,
@@ -63,24 +48,6 @@ METHODS: Mapping[str, Method] = {
     "dense": dense,
     "dense_at_jumps": dense_at_jumps,
 }
-
-
-def _surfaces(views: Sequence[View], pairs: Sequence[Pair]) -> dict[Pair, Answer]:
-    """Every pair costs its share of what all keyframes together took."""
-    start = time.perf_counter_ns()
-    scene = reconstruct(views, pairs, SceneOptions())
-    found = {(a, b): (scene.found(a, b), scene.found(b, a)) for a, b in pairs}
-    ms = (time.perf_counter_ns() - start) / 1e6 / max(len(pairs), 1)
-    return {pair: _surface(*found[pair], scene.matched.get(pair, 0), ms) for pair in pairs}
-
-
-def _surface(a: Found | None, b: Found | None, matched: int, ms: float) -> Answer:
-    if a is None or b is None:
-        return NO_DEPTH
-    said = (a.overlap, b.overlap, a.interval, b.interval)
-    if matched:
-        return Answer("image", "measured", *said, inliers=matched, ms=ms)
-    return Answer("predicted", "predicted", *said, ms=ms)
 
 
 def _planes(found: Survey, ms: float) -> Answer:
