@@ -25,6 +25,9 @@ from covista_service.workers import Workers, WorkersOptions, extract
 from tests.service.deadline import wait_until
 from tests.service.wall import keyframe_bytes, overlap, picture, picture_bytes
 
+# The first one may have to wait for the compiler.
+pytestmark = pytest.mark.timeout(300)
+
 
 def arrived(data: bytes, robot: str) -> Keyframe:
     boxes = Mailboxes()
@@ -49,6 +52,12 @@ def pair(distance_m: float = 1.0) -> SurveyPair:
         View(first.camera, first.pose, first.features),
         View(second.camera, second.pose, second.features),
     )
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled() -> None:
+    """What a fresh machine has to compile first, so that no worker below is waited for while it does."""
+    warm_up()
 
 
 @pytest.fixture(scope="module", params=["threads", "processes"])
