@@ -54,11 +54,13 @@ compose-test: .venv/.dev ## Station and rovers as containers, seen from outside
 .venv/.demo: pyproject.toml | .venv/bin/python
 	@echo "Installing the station into .venv (a minute or two)"
 	@$(PIP) install --editable '.[station]'
+	@$(call warm)
 	@touch $@
 
 .venv/.dev: pyproject.toml | .venv/bin/python
 	@echo "Installing the station and what develops it into .venv (a minute or two)"
 	@$(PIP) install --editable '.[dev]'
+	@$(call warm)
 	@touch .venv/.demo $@
 
 .venv/bin/python:
@@ -68,6 +70,11 @@ compose-test: .venv/.dev ## Station and rovers as containers, seen from outside
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { echo "$(PYTHON) cannot make an environment: on Debian, install python3-venv"; exit 1; }
 	@echo "Making .venv with $$($(PYTHON) --version)"
 	@$(PYTHON) -m venv --clear .venv
+
+# Here, so that the first start need not wait for a compiler.
+define warm
+echo "Compiling what is compiled (half a minute)" && $(BIN)/python -c 'from covista_service.perception.warming import warm_up; warm_up()'
+endef
 
 define need_engine
 docker info >/dev/null 2>&1 || { echo "No Docker engine answers here: start one, or run make demo, which needs none"; exit 1; }

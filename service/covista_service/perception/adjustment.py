@@ -50,7 +50,7 @@ class Link:
 class Sighted:
     """A keyframe: camera, reported pose, keypoints (n, 2) in ideal px, and the median depth of what it sees, metres.
 
-    One that is `held` stays where it is, whoever contradicts it.
+    One that is `held` stays where it is, whoever contradicts it; a `firm` one only for another.
     """
 
     camera: Camera
@@ -58,15 +58,12 @@ class Sighted:
     keypoints_px: Floats
     depth_m: float
     held: bool = False
+    firm: bool = False
 
 
 def adjust(keyframes: Sequence[Sighted], links: Mapping[Pair, Link], options: AdjustmentOptions) -> list[Pose]:
     """The poses of all keyframes, adjusted where links contradict them; the others exactly as reported."""
-    free = np.zeros(len(keyframes), np.bool_)
-    for pair, link in links.items():
-        if link.contradicts:
-            free[list(pair)] = True
-    free &= ~np.array([keyframe.held for keyframe in keyframes], np.bool_)
+    free = to_adjust(keyframes, links)
     if not free.any():
         return [keyframe.pose for keyframe in keyframes]
     reported = _poses([keyframe.pose for keyframe in keyframes])
@@ -87,6 +84,19 @@ def adjust(keyframes: Sequence[Sighted], links: Mapping[Pair, Link], options: Ad
     return [
         Pose(found.rotations[k], found.centres[k]) if free[k] else keyframe.pose for k, keyframe in enumerate(keyframes)
     ]
+
+
+def to_adjust(keyframes: Sequence[Sighted], links: Mapping[Pair, Link]) -> NDArray[np.bool_]:
+    """Which keyframes (n,) are to be adjusted: both of a pair that contradicts what was reported, unless it is held.
+
+    Where others bear out but one of the two, the other alone.
+    """
+    free = np.zeros(len(keyframes), np.bool_)
+    for (i, j), link in links.items():
+        if link.contradicts:
+            free[i] |= not keyframes[i].firm or keyframes[j].firm
+            free[j] |= not keyframes[j].firm or keyframes[i].firm
+    return free & ~np.array([keyframe.held for keyframe in keyframes], np.bool_)
 
 
 def averaged_rotations(prior: Prior, links: Mapping[Pair, Link], options: AdjustmentOptions) -> Floats:

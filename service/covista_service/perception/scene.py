@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from covista_service.perception.adjustment import AdjustmentOptions, Link, Sighted, adjust
+from covista_service.perception.adjustment import AdjustmentOptions, Link, Sighted, adjust, to_adjust
 from covista_service.perception.agreement import AgreementOptions, DepthPoints, Observations, agree
 from covista_service.perception.camera import Floats, Pose, View, relative, undistort
 from covista_service.perception.certainty import CertaintyOptions, Found, find
@@ -64,7 +64,8 @@ class Evidence:
 class Sight:
     """A keyframe among others: `view` with its reported pose, and the `pose` that stands.
 
-    One that is not `open` keeps its pose and its surface, and lends what it has. `beside` are depths of its keypoints
+    One that is not `open` keeps its pose and its surface, and lends what it has. The reported pose of a `firm` one is
+    borne out by others. `beside` are depths of its keypoints
     from keyframes that are not among the others, `former` the surface that it has, or one carried over from before.
     """
 
@@ -73,6 +74,7 @@ class Sight:
     open: bool = True
     beside: tuple[Observations, ...] = ()
     former: Surface | None = None
+    firm: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -181,12 +183,19 @@ def _adjusted(
         return [sight.pose for sight in sights]
     depths = _depths(sights, ideal, links)
     keyframes = [
-        Sighted(sight.view.camera, sight.view.pose if sight.open else sight.pose, points, depth, held=not sight.open)
+        Sighted(
+            sight.view.camera,
+            sight.view.pose if sight.open else sight.pose,
+            points,
+            depth,
+            held=not sight.open,
+            firm=sight.firm,
+        )
         for sight, points, depth in zip(sights, ideal, depths, strict=True)
     ]
+    free = to_adjust(keyframes, links)
     adjusted = adjust(keyframes, links, options.adjustment)
-    contradicted = {k for pair, link in links.items() if link.contradicts for k in pair}
-    return [adjusted[k] if sight.open and k in contradicted else sight.pose for k, sight in enumerate(sights)]
+    return [adjusted[k] if free[k] else sight.pose for k, sight in enumerate(sights)]
 
 
 def _depths(sights: Sequence[Sight], ideal: Sequence[Floats], links: Mapping[Pair, Link]) -> list[float]:
@@ -212,12 +221,16 @@ def _observed(
 ) -> Evidence:
     """The evidence with depths under the poses that stand now."""
     i, j = pair
-    motion = relative(poses[i], poses[j])
+    motion, link = relative(poses[i], poses[j]), said.link
+    if link is not None and link.contradicts and poses[i] is sights[i].pose and poses[j] is sights[j].pose:
+        # Nobody was there to give way: the pair keeps the pose that its own images tell.
+        motion = (link.rotation, link.translation)
+    elif link is not None:
+        # What has been brought to agree contradicts no longer.
+        link = replace(link, contradicts=False)
     if said.motion is not None and all(np.array_equal(*both) for both in zip(said.motion, motion, strict=True)):
         return said
     matched = Matched((sights[i].view, sights[j].view), (ideal[i], ideal[j]), said.matches, said.link is not None)
-    # What has been brought to agree contradicts no longer.
-    link = None if said.link is None else replace(said.link, contradicts=False)
     return Evidence(said.matches, link, motion, observe(matched, *motion, options.depths, options.seed))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -75,6 +76,7 @@ class Outlooks:
         self._evidence: dict[Names, Evidence] = {}
         # Robots whose surface is to be built anew, those at a worker, and jobs under way.
         self._stale: dict[str, None] = {}
+        self._agreements = Agreements()
         self._at_work: set[str] = set()
         self.under_way = 0
 
@@ -108,6 +110,8 @@ class Outlooks:
         current = [name for name in (first, second) if self._current(name)]
         if evidence is not None and current:
             self._evidence[first, second] = evidence
+            if len(current) == 2 and evidence.link is not None and self._as_reported(*current):
+                self._agreements.note(first.robot, second.robot, agree=not evidence.link.contradicts)
         for name in current:
             self._stale.setdefault(name.robot)
 
@@ -165,8 +169,12 @@ class Outlooks:
         """Drop a robot."""
         study = self._studies.pop(robot, None)
         self._stale.pop(robot, None)
+        self._agreements.forget(robot)
         if study is not None:
             self._retire(study.keyframe.id)
+
+    def _as_reported(self, *names: KeyframeId) -> bool:
+        return all(self._studies[name.robot].pose is self._studies[name.robot].keyframe.pose for name in names)
 
     def _current(self, name: KeyframeId) -> bool:
         study = self._studies.get(name.robot)
@@ -235,7 +243,8 @@ class Outlooks:
         study = self._studies[keyframe.id.robot]
         beside = tuple(study.beside.values()) if among else ()
         former = self._former(study, keyframe) if among else _own(study, keyframe)
-        return Sight(view_of(keyframe, keyframe.pose), self.pose(keyframe), among, beside, former)
+        firm = keyframe.id.robot in self._agreements.borne_out()
+        return Sight(view_of(keyframe, keyframe.pose), self.pose(keyframe), among, beside, former, firm)
 
     def _former(self, study: _Study, keyframe: Keyframe) -> Surface | None:
         """The keyframe's own surface, or that of the robot's last one carried over by the motion between them."""
@@ -264,6 +273,37 @@ def view_of(keyframe: Keyframe, pose: Pose) -> View:
     if keyframe.features is None:
         raise ValueError(f"{keyframe.id} has no features yet")
     return View(keyframe.camera, pose, keyframe.features)
+
+
+class Agreements:
+    """Which robots' reported poses the images of which others bear out."""
+
+    def __init__(self) -> None:
+        self._agree: dict[tuple[str, str], bool] = {}
+
+    def note(self, one: str, other: str, *, agree: bool) -> None:
+        """Enter whether the images of two robots agree with what the two have reported."""
+        self._agree[one, other] = agree
+
+    def borne_out(self) -> AbstractSet[str]:
+        """The largest set of robots that are connected by agreement: who contradicts them is taken to be wrong.
+
+        Nobody where no set is larger than all others.
+        """
+        names = sorted({name for pair in self._agree for name in pair})
+        index = {name: k for k, name in enumerate(names)}
+        parts = parts_of(len(names), [(index[a], index[b]) for (a, b), agree in self._agree.items() if agree])
+        if not len(parts):
+            return frozenset()
+        sizes = np.bincount(parts)
+        largest = int(sizes.argmax())
+        if (sizes == sizes[largest]).sum() > 1:
+            return frozenset()
+        return frozenset(name for name, part in zip(names, parts.tolist(), strict=True) if part == largest)
+
+    def forget(self, robot: str) -> None:
+        """Drop a robot."""
+        self._agree = {pair: agree for pair, agree in self._agree.items() if robot not in pair}
 
 
 class Scales:

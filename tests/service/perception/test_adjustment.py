@@ -1,6 +1,8 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from covista_service.perception.adjustment import AdjustmentOptions, Link, Sighted, adjust, tracks
+from covista_service.perception.adjustment import AdjustmentOptions, Link, Sighted, adjust, to_adjust, tracks
 from covista_service.perception.camera import Pose, relative
 from scipy.spatial.transform import Rotation
 
@@ -94,3 +96,14 @@ def test_a_chain_that_comes_to_a_keyframe_twice_is_no_track() -> None:
     # Point 0 is seen by three keyframes; the chain 0:1 - 1:1 - 2:5 - 0:7 comes to keyframe 0 twice.
     assert found.starts.tolist() == [0, 3]
     assert found.keyframes.tolist() == [0, 1, 2]
+
+
+def test_who_is_borne_out_gives_way_to_its_like_only() -> None:
+    reported = keyframes(TRUE)
+    link = Link(matches(0, 1), *relative(TRUE[0], TRUE[1]), True)
+    firm = [replace(one, firm=k in (0, 2)) for k, one in enumerate(reported)]
+    assert to_adjust(reported, {(0, 1): link}).tolist() == [True, True, False, False]
+    assert to_adjust(firm, {(0, 1): link}).tolist() == [False, True, False, False]
+    assert to_adjust(firm, {(0, 2): link}).tolist() == [True, False, True, False]
+    held = [replace(one, held=k == 1) for k, one in enumerate(firm)]
+    assert to_adjust(held, {(0, 1): link}).tolist() == [False, False, False, False]
