@@ -21,27 +21,36 @@ MAX_SIDE_PX = 800
 MIN_SIDE_PX = 16
 THUMBNAIL_WIDTH_PX = 96
 _EPSILON = 1e-7
+# Features are chosen from so many times their number; weak ones of ORB are seldom found again. One suppresses another
+# if its response is so much less.
+_CANDIDATES = {FeatureKind.ROOTSIFT: 2, FeatureKind.ORB: 1}
+_SUPPRESSION = 0.9
+# Distances between points are taken so many rows at a time, to bound memory.
+_BLOCK = 512
 _ORB_SCALE = 1.2
 
 
 def extract(
     image: NDArray[np.uint8], kind: FeatureKind | str = FeatureKind.ROOTSIFT, count: int = DEFAULT_COUNT
 ) -> Features:
-    """The strongest `count` features of `image`, (H, W) grey or (H, W, 3) BGR uint8; coordinates in its own pixels.
+    """Strong features of `image`, (H, W) grey or (H, W, 3) BGR uint8; coordinates in its own pixels.
 
-    RootSIFT (Arandjelovic and Zisserman, CVPR 2012): SIFT, L1-normalised, square root. Images larger than
-    `MAX_SIDE_PX` are shrunk first. An image without texture gives zero features. Raises ValueError for other arrays.
+    At most `count`; RootSIFT's are chosen from twice as many by `spread`. RootSIFT (Arandjelovic and Zisserman, CVPR
+    2012): SIFT, L1-normalised, square root. Images larger than `MAX_SIDE_PX` are shrunk first. An image without texture
+    gives zero features. Raises ValueError for other arrays.
     """
     cv2 = opencv()
     kind = FeatureKind(kind)
     grey, shrunk_by = _shrunk_grey(cv2, image)
     large_enough = min(grey.shape) >= MIN_SIDE_PX
-    keypoints, descriptors = _detector(cv2, kind, count).detectAndCompute(grey, None) if large_enough else ((), None)
+    keypoints, descriptors = (
+        _detector(cv2, kind, _CANDIDATES[kind] * count).detectAndCompute(grey, None) if large_enough else ((), None)
+    )
     if descriptors is None:
         return Features(kind, np.zeros((0, 2), np.float32), np.zeros((0, DESCRIPTOR_BYTES[kind]), np.uint8))
-    # SIFT may return a few more than asked for where responses tie.
-    strongest = np.argsort([-point.response for point in keypoints], kind="stable")[:count]
-    points = np.array([keypoints[i].pt for i in strongest], np.float64)
+    points = np.array([point.pt for point in keypoints], np.float64)
+    strongest = spread(points, np.array([point.response for point in keypoints]), count)
+    points = points[strongest]
     if kind is FeatureKind.ORB:
         points = _centred(points, np.array([keypoints[i].octave for i in strongest]), grey)
     # Pixel centres are at integers: shrinking maps x to (x + .5) s - .5.
@@ -50,6 +59,27 @@ def extract(
     points_px = np.clip(points, -0.5, high).astype(np.float32)
     chosen = descriptors[strongest]
     return Features(kind, points_px, root_sift(chosen) if kind is FeatureKind.ROOTSIFT else chosen)
+
+
+def spread(points_px: NDArray[np.float64], responses: NDArray[np.float64], count: int) -> NDArray[np.intp]:
+    """The `count` of n points (n, 2) that are the strongest over the widest neighbourhood, widest first.
+
+    Adaptive non-maximal suppression (Brown, Szeliski and Winder, CVPR 2005): where texture is strong, as many points
+    again tell nothing new, and surfaces need some everywhere. Points of one place suppress each other in no way.
+    """
+    order = np.argsort(-responses, kind="stable")
+    if len(order) <= count:
+        return order
+    points = (points_px[order] - points_px.mean(axis=0)).astype(np.float32)
+    # The first so many in this order are stronger than a point, by more than chance.
+    stronger = np.searchsorted(-responses[order], -responses[order] / _SUPPRESSION)
+    widths = np.full(len(points), np.inf, np.float32)
+    for block in np.array_split(np.arange(len(points)), len(points) // _BLOCK + 1):
+        rivals = points[: stronger[block].max(initial=0)]
+        squares = np.einsum("ij,ij->i", rivals, rivals) - 2 * points[block] @ rivals.T
+        squares[np.arange(len(rivals)) >= stronger[block, None]] = np.inf
+        widths[block] = squares.min(axis=1, initial=np.inf) + np.einsum("ij,ij->i", points[block], points[block])
+    return order[np.argsort(-widths, kind="stable")[:count]]
 
 
 def _detector(cv2: ModuleType, kind: FeatureKind, count: int) -> Any:

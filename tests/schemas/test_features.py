@@ -68,12 +68,43 @@ def test_descriptors_match_across_scales() -> None:
 
 
 @KINDS
-def test_no_more_than_asked_for_and_the_strongest(kind: FeatureKind) -> None:
+def test_no_more_than_asked_for(kind: FeatureKind) -> None:
     image = rubble(320, 240)
     few, many = features.extract(image, kind, count=50), features.extract(image, kind, count=400)
     assert len(few) == 50
     assert len(many) <= 400
     check_inside(many.keypoints_px, Camera(fx=1, fy=1, cx=0, cy=0, width=320, height=240))
+
+
+def widths(points: NDArray[np.float64], responses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far from each point the nearest clearly stronger one is, said plainly."""
+    distances = np.hypot(*(points[:, None] - points).transpose(2, 0, 1))
+    distances[0.9 * responses <= responses[:, None]] = np.inf
+    return np.asarray(distances.min(axis=1))
+
+
+def test_points_are_chosen_that_are_strongest_far_around() -> None:
+    random = np.random.default_rng(0)
+    points, responses = random.uniform(0, 640, (1300, 2)), random.random(1300)
+    chosen = features.spread(points, responses, 200)
+    expected = np.sort(widths(points, responses))[::-1][:200]
+    assert len(set(chosen.tolist())) == 200
+    np.testing.assert_allclose(np.sort(widths(points, responses)[chosen])[::-1], expected, rtol=1e-4)
+
+
+def test_a_corner_full_of_texture_does_not_take_all() -> None:
+    random = np.random.default_rng(0)
+    points = np.concatenate((random.uniform(0, 60, (500, 2)), random.uniform(0, 640, (500, 2))))
+    responses = np.concatenate((random.uniform(5, 10, 500), random.uniform(1, 2, 500)))
+    assert (features.spread(points, responses, 300) >= 500).sum() > 150
+    assert (np.argsort(-responses)[:300] >= 500).sum() == 0
+
+
+def test_two_orientations_of_one_place_stay_together() -> None:
+    places = np.random.default_rng(0).uniform(0, 640, (50, 2))
+    responses = np.repeat(np.linspace(1, 2, 50), 2)
+    chosen = features.spread(np.repeat(places, 2, axis=0), responses, 20)
+    assert sorted(chosen // 2) == sorted(np.repeat(np.unique(chosen // 2), 2))
 
 
 @KINDS

@@ -11,20 +11,20 @@ from scipy.spatial import KDTree
 from covista_service.perception.agreement import Observations
 from covista_service.perception.camera import Floats, View
 from covista_service.perception.epipolar import fundamental, homogeneous, residuals
-from covista_service.perception.guided import GuidedOptions, guided_matches
+from covista_service.perception.guided import Directions, GuidedOptions, guided_matches
 from covista_service.perception.sightings import Sightings
 from covista_service.perception.triangulation import TriangulationOptions, triangulate
 
 Mask = NDArray[np.bool_]
-_ROOTSIFT = "rootsift"
 
 
 @dataclass(frozen=True, slots=True)
 class DepthOptions:
     """A match is free if it lies within `inlier_px` of its epipolar line unguided.
 
-    A point stays if at least `agreeing` of its `neighbours` have its inverse depth, to within `tolerance` and 2 sigma,
-    and sigma is less than the inverse depth. Guided points lie within the range of the free ones, widened by `widened`.
+    A point stays if at least `agreeing` of its `neighbours`, `apart_px` off or more, have its inverse depth, to within
+    `tolerance` and `sigmas` of the difference, and sigma is less than the inverse depth. Guided points lie within the
+    range of the free ones, widened by `widened`.
     """
 
     inlier_px: float = 2.0
@@ -32,6 +32,7 @@ class DepthOptions:
     agreeing: int = 3
     tolerance: float = 0.10
     sigmas: float = 2.0
+    apart_px: float = 0.5
     widened: float = 3.0
     least_free: int = 8
     guided: GuidedOptions = field(default_factory=GuidedOptions)
@@ -89,16 +90,9 @@ def _with_guided(pair: Matched, F: Floats, options: DepthOptions, seed: int) -> 
 
 def _guided(pair: Matched, F: Floats, options: DepthOptions, second_px: Floats) -> NDArray[np.int64]:
     first, second = (view.features for view in pair.views)
-    if first.kind != _ROOTSIFT or second.kind != _ROOTSIFT:
+    if first.kind != second.kind:
         return pair.matches[:0]
-    one, other = (_unit(features.descriptors) for features in (first, second))
-    return guided_matches(pair.ideal_px[0], one, second_px, other, F, options.guided)
-
-
-def _unit(descriptors: NDArray[np.uint8]) -> NDArray[np.float32]:
-    values = descriptors.astype(np.float32)
-    length = np.maximum(np.linalg.norm(values, axis=1, keepdims=True), 1)
-    return np.asarray(values / length, np.float32)
+    return guided_matches(pair.ideal_px[0], Directions.of(first), second_px, Directions.of(second), F, options.guided)
 
 
 def _observed(
@@ -137,14 +131,18 @@ def _in_range(said: Observations, options: DepthOptions) -> Observations:
 
 
 def _neighbourly(positions: Floats, said: Observations, options: DepthOptions) -> Mask:
-    """Which points (n,) have enough neighbours of their depth."""
-    if len(said) < options.agreeing:
+    """Which points (n,) have enough neighbours of their depth, or nothing but such where there are fewer."""
+    count = min(2 * options.neighbours + 1, len(said))
+    if count < 2:
         return np.ones(len(said), np.bool_)
-    count = min(options.neighbours + 1, len(said))
-    index = np.asarray(KDTree(positions).query(positions, count)[1], np.intp)[:, 1:]
-    room = options.tolerance * said.inverse_depths + options.sigmas * said.sigmas
-    close = np.abs(said.inverse_depths[index] - said.inverse_depths[:, None]) < room[:, None]
-    return np.asarray(close.sum(axis=1) >= options.agreeing, np.bool_)
+    distance, index = KDTree(positions).query(positions, count)
+    # A keypoint with two orientations is there twice, and no witness for itself.
+    elsewhere = distance > options.apart_px
+    elsewhere &= np.cumsum(elsewhere, axis=1) <= options.neighbours
+    room = options.tolerance * said.inverse_depths[:, None]
+    room = room + options.sigmas * np.hypot(said.sigmas[:, None], said.sigmas[index])
+    close = elsewhere & (np.abs(said.inverse_depths[index] - said.inverse_depths[:, None]) < room)
+    return np.asarray(close.sum(axis=1) >= np.minimum(options.agreeing, elsewhere.sum(axis=1)), np.bool_)
 
 
 def _nothing() -> Observations:

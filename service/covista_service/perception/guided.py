@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from covista_service.perception.camera import Floats
+from covista_service.perception.camera import Features, Floats
 from covista_service.perception.compiled import compiled
 
 
@@ -15,7 +15,7 @@ from covista_service.perception.compiled import compiled
 class GuidedOptions:
     """A candidate lies within `band_px` of the epipolar line and is likelier than the next by `ratio`.
 
-    `least_cosine` between RootSIFT descriptors. For a pair that nothing else verifies, the matches must outnumber
+    `least_cosine` between descriptors. For a pair that nothing else verifies, the matches must outnumber
     `chance_factor` times those that shuffled positions give, plus `chance_margin`.
     """
 
@@ -26,23 +26,41 @@ class GuidedOptions:
     chance_margin: int = 8
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Directions:
+    """Descriptors as unit vectors, of which cosines are taken: `values` (n, d) of RootSIFT, or signs in `bits` (n, w).
+
+    The one or the other has no columns. A word of 64 bits is 64 components of one length, + or -.
+    """
+
+    values: NDArray[np.float32]
+    bits: NDArray[np.uint64]
+
+    @classmethod
+    def of(cls, features: Features) -> Directions:
+        """Those of RootSIFT or ORB."""
+        count = len(features.descriptors)
+        if features.kind == "orb":
+            return cls(np.zeros((count, 0), np.float32), np.ascontiguousarray(features.descriptors).view(np.uint64))
+        values = features.descriptors.astype(np.float32)
+        length = np.maximum(np.linalg.norm(values, axis=1, keepdims=True), 1)
+        return cls(np.asarray(values / length, np.float32), np.zeros((count, 0), np.uint64))
+
+
 def guided_matches(
-    first_px: Floats,
-    first_descriptors: NDArray[np.float32],
-    second_px: Floats,
-    second_descriptors: NDArray[np.float32],
-    F: Floats,
-    options: GuidedOptions,
+    first_px: Floats, first: Directions, second_px: Floats, second: Directions, F: Floats, options: GuidedOptions
 ) -> NDArray[np.int64]:
-    """Index pairs (k, 2) of mutual best matches with v_2 . F v_1 = 0 to within the band; unit descriptors (n, d)."""
+    """Index pairs (k, 2) of mutual best matches with v_2 . F v_1 = 0 to within the band; both of one kind."""
     if not len(first_px) or not len(second_px):
         return np.zeros((0, 2), np.int64)
     return np.asarray(
         _match(
             first_px,
-            first_descriptors,
+            first.values,
+            first.bits,
             second_px,
-            second_descriptors,
+            second.values,
+            second.bits,
             np.ascontiguousarray(F),
             options.band_px,
             options.ratio**2,
@@ -56,8 +74,10 @@ def guided_matches(
 def _match(
     first: Floats,
     one: NDArray[np.float32],
+    one_bits: NDArray[np.uint64],
     second: Floats,
     other: NDArray[np.float32],
+    other_bits: NDArray[np.uint64],
     F: Floats,
     band_px: float,
     ratio2: float,
@@ -77,6 +97,8 @@ def _match(
                 cosine = np.float32(0.0)
                 for k in range(one.shape[1]):
                     cosine += one[i, k] * other[j, k]
+                if one_bits.shape[1]:
+                    cosine = _cosine_of_signs(one_bits[i], other_bits[j])
                 _enter(i, j, cosine, best, top, runner_up)
                 _enter(j, i, cosine, best_back, top_back, runner_up_back)
     # |d1 - d2|^2 = 2 - 2 cos for unit descriptors.
@@ -90,6 +112,19 @@ def _match(
             pairs[count, 0], pairs[count, 1] = i, j
             count += 1
     return pairs[:count]
+
+
+@compiled
+def _cosine_of_signs(one: NDArray[np.uint64], other: NDArray[np.uint64]) -> np.float32:
+    """1 - 2 (share of bits that differ), counted in parallel within each word."""
+    differ = np.int64(0)
+    for k in range(len(one)):
+        word = one[k] ^ other[k]
+        word -= (word >> np.uint64(1)) & np.uint64(0x5555555555555555)
+        word = (word & np.uint64(0x3333333333333333)) + ((word >> np.uint64(2)) & np.uint64(0x3333333333333333))
+        word = (word + (word >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
+        differ += np.int64((word * np.uint64(0x0101010101010101)) >> np.uint64(56))
+    return np.float32(1 - differ / (32 * len(one)))
 
 
 @compiled

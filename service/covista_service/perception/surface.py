@@ -31,9 +31,9 @@ class SurfaceOptions:
     loss: float = 0.03
     passes: int = 2
     ridge: float = 0.005
-    clip: float = 0.10
+    clip: float = 0.30
     grey_sigma: float = 20.0
-    grey_floor: float = 0.1
+    grey_floor: float = 0.3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
