@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from covista_service.perception.camera import Floats
 from covista_service.perception.compiled import compiled
+from covista_service.perception.nearest import nearest
 
 Mask = NDArray[np.bool_]
 AGREED, SINGLE, CONTRADICTED = 1.0, 0.4, 0.1
@@ -103,11 +103,10 @@ def _supported(points: DepthPoints, free: Mask, width_px: int, options: Agreemen
     if agreed.sum() < options.least_agreed or agreed.mean() < options.least_agreed_share:
         return np.ones(len(points), np.bool_)
     count = min(options.neighbours + 1, len(points))
-    reach = options.reach * width_px
-    distance, index = KDTree(points.positions_px).query(points.positions_px, count, distance_upper_bound=reach)
+    distance, index = nearest(points.positions_px, points.positions_px, count, options.reach * width_px)
     share = _support(
-        np.asarray(distance, np.float64)[:, 1:],
-        np.asarray(index, np.int64)[:, 1:],
+        distance[:, 1:],
+        index[:, 1:],
         points.inverse_depths,
         points.sigmas,
         points.confidences,

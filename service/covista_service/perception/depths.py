@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from covista_service.perception.agreement import Observations
 from covista_service.perception.camera import Floats, View
 from covista_service.perception.epipolar import fundamental, homogeneous, residuals
 from covista_service.perception.guided import Directions, GuidedOptions, guided_matches
+from covista_service.perception.nearest import nearest
 from covista_service.perception.sightings import Sightings
 from covista_service.perception.triangulation import TriangulationOptions, triangulate
 
@@ -135,7 +135,7 @@ def _neighbourly(positions: Floats, said: Observations, options: DepthOptions) -
     count = min(2 * options.neighbours + 1, len(said))
     if count < 2:
         return np.ones(len(said), np.bool_)
-    distance, index = KDTree(positions).query(positions, count)
+    distance, index = nearest(positions, positions, count)
     # A keypoint with two orientations is there twice, and no witness for itself.
     elsewhere = distance > options.apart_px
     elsewhere &= np.cumsum(elsewhere, axis=1) <= options.neighbours

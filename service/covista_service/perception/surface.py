@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from covista_service.perception.agreement import DepthPoints
 from covista_service.perception.camera import Camera, Floats
 from covista_service.perception.compiled import compiled
+from covista_service.perception.nearest import nearest
 
 COLUMNS, ROWS = 48, 36
 _CELL = 1.0 / COLUMNS
@@ -62,9 +62,7 @@ def interpolate(
     """The surface through one point or more; `thumbnail` (h, w) is the same image, small and grey, if there is one."""
     cells = cell_centres(camera)
     count = min(options.neighbours, len(points))
-    distance, index = KDTree(points.positions_px).query(cells, count)
-    distance = np.asarray(distance, np.float64).reshape(-1, count)
-    index = np.asarray(index, np.int64).reshape(-1, count)
+    distance, index = nearest(points.positions_px, cells, count)
     likeness = np.ones((len(cells), count))
     if thumbnail is not None:
         likeness = _likeness(thumbnail, camera, cells, points.positions_px, index, options)
