@@ -78,6 +78,8 @@ def _with_guided(pair: Matched, F: Floats, options: DepthOptions, seed: int) -> 
     free = pair.matches[fits]
     guided = _guided(pair, F, options, pair.ideal_px[1])
     if not pair.verified:
+        if len(guided) <= options.guided.chance_margin:
+            return free[:0], np.zeros(0, np.bool_)
         shuffled = np.random.default_rng(seed).permutation(pair.ideal_px[1])
         chance = len(_guided(pair, F, options, shuffled))
         if len(guided) <= options.guided.chance_factor * chance + options.guided.chance_margin:

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from covista_service.perception.camera import Floats
+from covista_service.perception.compiled import compiled
 
 # Beyond e^9 either way any ratio will do.
 _ANY = 9.0
@@ -20,9 +19,7 @@ def parts_of(count: int, joined: Sequence[tuple[int, int]]) -> NDArray[np.int64]
 
     Their depths have one scale.
     """
-    ends = np.array(joined, np.int64).reshape(-1, 2)
-    graph = coo_array((np.ones(len(ends), np.int64), (ends[:, 0], ends[:, 1])), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1], np.int64)
+    return _parts(count, np.array(joined, np.int64).reshape(-1, 2))
 
 
 def scale_sigmas(centres_m: Floats, depths_m: Floats, parts: NDArray[np.int64], position_share: float) -> Floats:
@@ -46,3 +43,27 @@ def ratio_range(one_sigma: float, other_sigma: float, sigmas: float) -> tuple[fl
     """Least and greatest ratio of the scales of two parts, `sigmas` of them off."""
     room = min(sigmas * float(np.hypot(one_sigma, other_sigma)), _ANY)
     return float(np.exp(-room)), float(np.exp(room))
+
+
+@compiled
+def _parts(count: int, joined: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Union and find; parts are numbered by their first members. A sparse graph takes a millisecond for a few ends."""
+    above = np.arange(count)
+    for k in range(len(joined)):
+        one, other = joined[k]
+        while above[one] != one:
+            above[one] = above[above[one]]
+            one = above[one]
+        while above[other] != other:
+            above[other] = above[above[other]]
+            other = above[other]
+        above[max(one, other)] = min(one, other)
+    parts, number = np.empty(count, np.int64), 0
+    for k in range(count):
+        # What stands above comes before.
+        if above[k] == k:
+            parts[k] = number
+            number += 1
+        else:
+            parts[k] = parts[above[k]]
+    return parts

@@ -226,10 +226,13 @@ class Outlooks:
             held.update({keyframe.id: keyframe for keyframe in pair if keyframe is not None})
             evidence[names] = self._evidence[names]
         index = {name: k for k, name in enumerate(held)}
-        count = len(opened)
+        count, borne_out = len(opened), self._agreements.borne_out()
         return BuildSurfaces(
             tuple(held),
-            tuple(self._sight(keyframe, among=k < count) for k, keyframe in enumerate(held.values())),
+            tuple(
+                self._sight(keyframe, among=k < count, firm=keyframe.id.robot in borne_out)
+                for k, keyframe in enumerate(held.values())
+            ),
             tuple(keyframe.thumbnail if k < count else None for k, keyframe in enumerate(held.values())),
             {(index[first], index[second]): said for (first, second), said in evidence.items()},
         )
@@ -238,12 +241,11 @@ class Outlooks:
         study = self._studies.get(name.robot)
         return None if study is None else study.find(name)
 
-    def _sight(self, keyframe: Keyframe, *, among: bool) -> Sight:
+    def _sight(self, keyframe: Keyframe, *, among: bool, firm: bool) -> Sight:
         """A keyframe for a job, `among` those that are to be built or only beside them."""
         study = self._studies[keyframe.id.robot]
         beside = tuple(study.beside.values()) if among else ()
         former = self._former(study, keyframe) if among else _own(study, keyframe)
-        firm = keyframe.id.robot in self._agreements.borne_out()
         return Sight(view_of(keyframe, keyframe.pose), self.pose(keyframe), among, beside, former, firm)
 
     def _former(self, study: _Study, keyframe: Keyframe) -> Surface | None:
