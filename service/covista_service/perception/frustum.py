@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from covista_service.perception.camera import Camera, Floats, Pose, relative
 from covista_service.perception.overlap import common_field
@@ -37,7 +40,7 @@ def may_meet(
 class Frustum:
     """A view frustum in the world, built once and held against many others.
 
-    Corners (k, 3), directions (0 | 4, 3) in which it is endless, faces n . X <= d.
+    Corners (8, 3), directions (4, 3) in which it is endless, zero if it is not, and faces n . X <= d (6 of them).
     """
 
     def __init__(self, camera: Camera, pose: Pose, near_far_m: tuple[float, float]) -> None:
@@ -46,26 +49,40 @@ class Frustum:
         pixels = np.array([[-0.5, -0.5, 1], [right, -0.5, 1], [right, bottom, 1], [-0.5, bottom, 1]])
         rays = pixels @ camera.rays_from_pixels.T @ pose.world_from_camera.T
         endless = not np.isfinite(far)
-        depths = [near] if endless else [near, far]
-        self.corners = pose.centre_m + np.vstack([depth * rays for depth in depths])
-        self.directions = rays if endless else np.zeros((0, 3))
+        self.corners = pose.centre_m + np.vstack([depth * rays for depth in (near, near if endless else far)])
+        self.directions = rays if endless else np.zeros((4, 3))
         forward = pose.world_from_camera[:, 2]
         sides = np.cross(np.roll(rays, -1, axis=0), rays)
         at_centre = sides @ pose.centre_m
-        ends = [-forward] if endless else [-forward, forward]
-        limits = [-near] if endless else [-near, far]
-        self.normals = np.vstack([sides, *ends])
-        self.offsets = np.concatenate([at_centre, np.array(limits) + np.array(ends) @ pose.centre_m])
+        ends = np.array([-forward, forward])
+        # Nothing lies beyond the far face of an endless one.
+        self.normals = np.vstack([sides, ends])
+        self.offsets = np.concatenate([at_centre, np.array([-near, far]) + ends @ pose.centre_m])
 
     def may_meet(self, other: Frustum) -> bool:
         """As `may_meet`."""
-        return not (self._has_face_before(other) or other._has_face_before(self))
+        return bool(Frusta([other]).may_meet(self)[0])
 
-    def _has_face_before(self, other: Frustum) -> bool:
-        """Does a face have the whole other frustum on its outer side?"""
-        beyond = (other.corners @ self.normals.T > self.offsets).all(axis=0)
-        parting = (other.directions @ self.normals.T >= 0).all(axis=0)
-        return bool((beyond & parting).any())
+
+class Frusta:
+    """Many view frusta, each held against one other at once."""
+
+    def __init__(self, frusta: Sequence[Frustum]) -> None:
+        """Stack n frusta."""
+        self._corners = np.array([one.corners for one in frusta]).reshape(-1, 8, 3)
+        self._directions = np.array([one.directions for one in frusta]).reshape(-1, 4, 3)
+        self._normals = np.array([one.normals for one in frusta]).reshape(-1, 6, 3)
+        self._offsets = np.array([one.offsets for one in frusta]).reshape(-1, 6)
+
+    def may_meet(self, other: Frustum) -> NDArray[np.bool_]:
+        """Which of them (n,) may meet it, as `may_meet`."""
+        # Does a face of theirs have the whole other frustum on its outer side, or a face of its theirs?
+        faces = self._normals.transpose(0, 2, 1)
+        theirs = (other.corners @ faces > self._offsets[:, None]).all(axis=1)
+        theirs &= (other.directions @ faces >= 0).all(axis=1)
+        its = (self._corners @ other.normals.T > other.offsets).all(axis=1)
+        its &= (self._directions @ other.normals.T >= 0).all(axis=1)
+        return np.asarray(~(theirs.any(axis=1) | its.any(axis=1)), np.bool_)
 
 
 def _parallel_plane(depth_m: float) -> Floats:

@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 
 from covista_schemas.reports import EventKind, FoundBy
 
+from covista_service.perception.comparison import Outcome
+from covista_service.perception.frustum import Frusta
 from covista_service.perception.scene import Evidence
 from covista_service.station import prospects
 from covista_service.station.agenda import Agenda
@@ -23,7 +25,7 @@ from covista_service.station.events import (
 from covista_service.station.groups import Groups
 from covista_service.station.options import StationOptions
 from covista_service.station.outlooks import Outlook, Outlooks, Ratios, view_of
-from covista_service.station.pairs import Answer, Pairs, pair_of
+from covista_service.station.pairs import Answer, Pairs
 from covista_service.station.roster import Robot, Roster
 
 # The overlap of an outlook with each of others, as `prospects.read` tells it.
@@ -68,14 +70,12 @@ class Surveys:
 
         False if there was nothing to judge.
         """
-        together: set[Pair] = set()
-        for robot in self._to_judge:
-            others = [other.id for other in self._roster if other.keyframe is not None and other.id != robot]
-            together.update(pair_of(robot, other) for other in others)
+        robots = [self._roster[robot] for robot in self._to_judge]
         self._to_judge.clear()
-        for pair in sorted(together):
-            self._judge(pair, now_ns)
-        return bool(together)
+        for robot in robots:
+            if robot.keyframe is not None:
+                self._judge(robot, robot.keyframe, now_ns)
+        return bool(robots)
 
     def start(self, now_ns: int) -> list[Effect]:
         """As many surfaces, and then surveys, as there are hands for."""
@@ -120,7 +120,7 @@ class Surveys:
         self._outlooks.surveyed(event.first, event.second, None if event.found is None else Evidence.of(event.found))
         if pair[0] != pair[1]:
             self._pairs.surveyed(*keyframes, event.found)
-            self._judge(pair, now_ns)
+            self._look_over(pair, now_ns)
             self._agenda.again(pair)
         if event.found is None:
             text = f"the survey of {pair[0]} and {pair[1]} failed: {event.problem}"
@@ -151,20 +151,34 @@ class Surveys:
         one, other = (view_of(keyframe, self._outlooks.pose(keyframe)) for keyframe in (first, second))
         return SurveyPair(first.id, second.id, one, other)
 
-    def _judge(self, pair: Pair, now_ns: int) -> None:
-        first, second = self._roster[pair[0]], self._roster[pair[1]]
-        if first.keyframe is None or second.keyframe is None:
-            return
-        # What was seen in common is worth another look, if only to find that it is no more.
+    def _judge(self, robot: Robot, keyframe: Keyframe, now_ns: int, among: Sequence[str] | None = None) -> None:
+        """Judge a robot's pairs with all others, or with those named alone."""
+        others = [
+            (other, other.keyframe)
+            for other in (self._roster if among is None else map(self._roster.__getitem__, among))
+            if other.keyframe is not None and other is not robot
+        ]
+        frusta = Frusta([self._reach(*other).frustum for other in others])
+        for (other, beside), meet in zip(others, frusta.may_meet(self._reach(robot, keyframe).frustum), strict=True):
+            both = (keyframe, beside) if robot.id < other.id else (beside, keyframe)
+            pair = (both[0].id.robot, both[1].id.robot)
+            plausible = bool(meet) or self._worth_another_look(pair, both)
+            self._agenda.judge(pair, plausible=plausible)
+            if not plausible:
+                self._pairs.enter(pair, Answer((0.0, 0.0), FoundBy.PREDICTED, now_ns, *both))
+                self._groups.see(pair, self._pairs.overlaps(pair))
+
+    def _look_over(self, pair: Pair, now_ns: int) -> None:
+        """A survey that found nothing ends what was kept for another look alone."""
+        robot = self._roster[pair[0]]
+        if robot.keyframe is not None and self._pairs[pair].outcome != Outcome.MEASURED:
+            self._judge(robot, robot.keyframe, now_ns, (pair[1],))
+
+    def _worth_another_look(self, pair: Pair, keyframes: tuple[Keyframe, Keyframe]) -> bool:
+        """Was something seen in common before? If only to find that it is no more."""
         record = self._pairs[pair]
-        looked = record.surveyed == (first.keyframe.id, second.keyframe.id)
-        overlapped = record.measured and not looked and sum(self._pairs.overlaps(pair) or ()) > 0
-        reaches = self._reach(first, first.keyframe), self._reach(second, second.keyframe)
-        plausible = overlapped or reaches[0].frustum.may_meet(reaches[1].frustum)
-        self._agenda.judge(pair, plausible=plausible)
-        if not plausible:
-            self._pairs.enter(pair, Answer((0.0, 0.0), FoundBy.PREDICTED, now_ns, first.keyframe, second.keyframe))
-            self._groups.see(pair, (0.0, 0.0))
+        looked = record.surveyed == (keyframes[0].id, keyframes[1].id)
+        return record.measured and not looked and sum(self._pairs.overlaps(pair) or ()) > 0
 
     def _reach(self, robot: Robot, keyframe: Keyframe) -> prospects.Reach:
         held = self._reaches.get(robot.id)
