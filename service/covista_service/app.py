@@ -77,11 +77,10 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
         close_later(Queries(session, settings.site, loop.ask).close)
         link = PartHealth(status="ready", detail=", ".join((*settings.link, *settings.connect)))
 
-        crew = PartHealth(status="ready", detail=f"{workers.capacity} {settings.workers}")
-
         def health_now() -> Health:
-            moving = {"store": history.health(), "loop": _loop_health(loop, task)}
-            return _health({"link": link, "workers": crew, **moving})
+            moving = {"workers": _crew_health(workers, settings.workers)}
+            moving |= {"store": history.health(), "loop": _loop_health(loop, task)}
+            return _health({"link": link, **moving})
 
         yield Parts(loop, telemetry, health_now, lambda: mailboxes.turned_away, secrets.token_hex(4))
 
@@ -90,6 +89,13 @@ async def _end(task: asyncio.Task[None]) -> None:
     task.cancel()
     with suppress(asyncio.CancelledError):
         await task
+
+
+def _crew_health(workers: Workers, kind: str) -> PartHealth:
+    crew = f"{workers.capacity} {kind}"
+    if not workers.warm:
+        return PartHealth(status="starting", detail=f"{crew}, loading compiled code")
+    return PartHealth(status="ready", detail=crew)
 
 
 def _loop_health(loop: Loop, task: asyncio.Task[None]) -> PartHealth:

@@ -56,8 +56,12 @@ class Workers:
         self._pool = _pool(options)
         # Processes take a second or two to start, and compiled code to load: now is better than when the first robot
         # waits. Threads share what one of them has loaded.
-        for _ in range(1 if options.kind == "threads" else options.count):
-            self._submit(warm_up)
+        self._warming = [self._submit(warm_up) for _ in range(1 if options.kind == "threads" else options.count)]
+
+    @property
+    def warm(self) -> bool:
+        """Is compiled code loaded, so that no keyframe has to wait for it?"""
+        return all(one.done() for one in self._warming)
 
     @property
     def capacity(self) -> int:

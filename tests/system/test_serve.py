@@ -15,7 +15,7 @@ import httpx
 import psutil
 import pytest
 
-from tests.service.deadline import free_endpoint
+from tests.service.deadline import free_endpoint, wait_until
 
 COMMAND = [sys.executable, "-m", "covista_service", "serve"]
 STOP_S = 3.0
@@ -66,7 +66,7 @@ def serving(folder: Path, *flags: str) -> Iterator[tuple[subprocess.Popen[str], 
 @pytest.mark.parametrize(("workers", "number"), [("threads", signal.SIGTERM), ("processes", signal.SIGINT)])
 def test_a_signal_ends_it_soon_with_0_and_nothing_left(tmp_path: Path, workers: str, number: signal.Signals) -> None:
     with serving(tmp_path, "--workers", workers) as (process, url):
-        assert httpx.get(f"{url}/readyz").json()["status"] == "ready"
+        wait_until(lambda: httpx.get(f"{url}/readyz").json()["status"] == "ready", "it is ready", 60)
         family = psutil.Process(process.pid).children(recursive=True)
         assert bool(family) == (workers == "processes")
         # A connection that stays open does not keep it.
@@ -124,6 +124,7 @@ def test_a_database_without_a_driver_is_one_line(tmp_path: Path) -> None:
 
 def test_an_unusable_database_degrades_the_station_and_does_not_stop_it(tmp_path: Path) -> None:
     with serving(tmp_path, "--database", "sqlite:////absent/folder/covista.db") as (_, url):
+        wait_until(lambda: httpx.get(f"{url}/readyz").json()["parts"]["workers"]["status"] == "ready", "warm", 60)
         answer = httpx.get(f"{url}/readyz")
         assert answer.status_code == 200
         assert answer.json()["status"] == "degraded"

@@ -16,7 +16,12 @@ class Watch:
     """A client of the station's REST interface; raises ApiError when it does not answer."""
 
     def __init__(self, url: str) -> None:
+        self._url = url
         self._client = httpx.Client(base_url=f"{url}/api/v1", timeout=_TIMEOUT_S)
+
+    def ready(self) -> bool:
+        """Does the station say that it is ready?"""
+        return self._client.get(f"{self._url}/readyz").is_success
 
     def groups(self) -> GroupsReport:
         """The groups that stand."""
