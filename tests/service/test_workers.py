@@ -91,7 +91,8 @@ def test_surfaces_are_built(workers: Workers, thumbnail: bytes | None) -> None:
     settled, said = workers.build(BuildSurfaces(names, sights, (thumbnail, None), evidence)).result(30)
     assert said[0, 1].matched > 50
     one, other = (
-        Outlook(keyframe(name), each.pose, each.surface, 50, {}) for name, each in zip(names, settled, strict=True)
+        Outlook(keyframe(name), each.pose, each.surface, 50, {}, (1.0, 1.0, 1.0))
+        for name, each in zip(names, settled, strict=True)
     )
     assert masks(one, other, (1.0, 1.0))[0].mean() == pytest.approx(overlap(1.0), abs=0.05)
 

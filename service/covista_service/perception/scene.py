@@ -17,6 +17,7 @@ from covista_service.perception.depths import DepthOptions, Matched, observe
 from covista_service.perception.scales import parts_of, ratio_range, scale_sigmas
 from covista_service.perception.surface import Surface, SurfaceOptions, flat, interpolate
 from covista_service.perception.visibility import SAME_SCALE, Seeing, VisibilityOptions
+from covista_service.perception.warp import Carried
 
 Pair = tuple[int, int]
 Motion = tuple[Floats, Floats]
@@ -66,7 +67,7 @@ class Sight:
 
     One that is not `open` keeps its pose and its surface, and lends what it has. The reported pose of a `firm` one is
     borne out by others. `beside` are depths of its keypoints
-    from keyframes that are not among the others, `former` the surface that it has, or one carried over from before.
+    from keyframes that are not among the others, `former` the surface that it has, `carried` one from before.
     """
 
     view: View
@@ -74,6 +75,7 @@ class Sight:
     open: bool = True
     beside: tuple[Observations, ...] = ()
     former: Surface | None = None
+    carried: Carried | None = None
     firm: bool = False
 
 
@@ -253,7 +255,9 @@ def _surfaces(
         surface = sight.former
         if sight.open and len(own) >= options.least_points:
             surface = interpolate(own, sight.view.camera, options.surface, sight.view.thumbnail)
-        elif surface is None:
+        elif surface is None and sight.carried is not None:
+            surface = sight.carried.over(sight.view.camera, options.surface)
+        if surface is None:
             others = [known[other] for pair in pairs if k in pair for other in pair if other in known]
             surface = flat(float(np.median(others))) if others else None
         surfaces.append(surface)

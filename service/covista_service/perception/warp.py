@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from covista_service.perception.agreement import SINGLE, DepthPoints
@@ -13,6 +15,20 @@ _STRIDE = 3
 _AHEAD = 1e-9
 # How far beyond the new image, in widths, a point still says something of the cells at its border.
 _BEYOND = 0.25
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Carried:
+    """A surface as `camera` saw it, and the motion X_2 = R X_1 + t to another view."""
+
+    surface: Surface
+    camera: Camera
+    rotation: Floats
+    translation: Floats
+
+    def over(self, to: Camera, options: SurfaceOptions) -> Surface | None:
+        """The surface in the other view."""
+        return warped(self.surface, self.camera, self.rotation, self.translation, to, options)
 
 
 def warped(

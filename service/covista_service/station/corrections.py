@@ -43,8 +43,7 @@ class Corrections:
         """Take in an outlook, `again` if its keyframe had one before; what mission control should hear of."""
         robot = outlook.keyframe.id.robot
         deg, m = _off(outlook)
-        depth_m = 1.0 / float(np.median(outlook.surface.inverse_depth))
-        disagrees = deg > _DEG or m > _SHARE * depth_m
+        disagrees = deg > _DEG or m > _SHARE * outlook.depths_m[1]
         held = self._corrections.get(robot)
         before = 0 if held is None else held.disagreeing - (again and held.disagreeing > 0)
         self._corrections[robot] = Correction(deg, m, before + 1 if disagrees else 0)

@@ -16,6 +16,8 @@ from covista_service.station.events import Effect, GroupsChanged, Happened, Pair
 from covista_service.station.options import GroupingOptions, StationOptions, nanoseconds
 from covista_service.station.snapshot import GroupsView, GroupView, Reason, SimilarityView
 
+# Keyframes that come together are evaluated together.
+_APART_S = 0.02
 Ungrouped = tuple[tuple[str, Reason], ...]
 
 
@@ -25,6 +27,7 @@ class Groups:
     def __init__(self, options: StationOptions) -> None:
         self._affinity = Affinity()
         self._regroup_after_ns = nanoseconds(options.regroup_after_s)
+        self._apart_ns = nanoseconds(min(options.regroup_after_s, _APART_S))
         self._members: dict[str, Members] = {}
         self._label_of: dict[str, str] = {}
         self._next_label = 1
@@ -71,6 +74,10 @@ class Groups:
         """Group by other settings from the next evaluation on."""
         self.view = replace(self.view, settings=options)
         self._news = True
+
+    def may_evaluate(self, now_ns: int) -> bool:
+        """Is the last evaluation over for long enough that news of a keyframe need not wait for that of others?"""
+        return not 0 <= now_ns - self._evaluated_ns < self._apart_ns
 
     def evaluate(self, ungrouped: Ungrouped, now_ns: int, *, at_once: bool) -> list[Effect]:
         """Bring similarity and groups up to date if there is news; a new revision only if someone stands elsewhere.

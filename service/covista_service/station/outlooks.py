@@ -14,9 +14,9 @@ from covista_service.perception.agreement import Observations
 from covista_service.perception.camera import Pose, View, relative
 from covista_service.perception.scales import parts_of, ratio_range, scale_sigmas
 from covista_service.perception.scene import Evidence, Settled, Sight
-from covista_service.perception.surface import Surface, SurfaceOptions
+from covista_service.perception.surface import Surface
 from covista_service.perception.visibility import SAME_SCALE, Mask, Seeing, VisibilityOptions, seen
-from covista_service.perception.warp import warped
+from covista_service.perception.warp import Carried
 from covista_service.station.events import BuildSurfaces, Keyframe, KeyframeId, SurfacesBuilt
 
 # Depths that keyframes replaced since have given to one that is still in use.
@@ -29,13 +29,15 @@ _LEAST_BASELINE, _BEST_BASELINE, _MOST_BASELINE = 0.02, 0.1, 0.4
 Names = tuple[KeyframeId, KeyframeId]
 # Least and greatest ratio of the scales of two keyframes' depths.
 Ratios = tuple[float, float]
+Depths = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outlook:
     """A keyframe, the pose that stands for it, its surface, and how many points of its own that rests on.
 
-    `matched`: keyframes that share matched points with it, and how many.
+    `matched`: keyframes that share matched points with it, and how many. `depths_m`: how near its surface is (5 %), its
+    median and how far (95 %).
     """
 
     keyframe: Keyframe
@@ -43,6 +45,7 @@ class Outlook:
     surface: Surface
     points: int
     matched: Mapping[KeyframeId, int]
+    depths_m: Depths
 
 
 @dataclass(slots=True, eq=False)
@@ -70,8 +73,7 @@ class _Study:
 class Outlooks:
     """Outlooks by robot, the evidence between keyframes in use, and what is to be built."""
 
-    def __init__(self, surface: SurfaceOptions | None = None) -> None:
-        self._surface = surface or SurfaceOptions()
+    def __init__(self) -> None:
         self._studies: dict[str, _Study] = {}
         self._evidence: dict[Names, Evidence] = {}
         # Robots whose surface is to be built anew, those at a worker, and jobs under way.
@@ -103,7 +105,7 @@ class Outlooks:
         study.earlier = held.earlier
         study.earlier.append(replace(held.keyframe, image=None))
         self._retire(held.keyframe.id)
-        return None if held.outlook is None else _partner(keyframe, study.earlier, _depth_m(held.outlook))
+        return None if held.outlook is None else _partner(keyframe, study.earlier, held.outlook.depths_m[1])
 
     def surveyed(self, first: KeyframeId, second: KeyframeId, evidence: Evidence | None) -> None:
         """Take what a survey found, None if it failed; surfaces of its keyframes still in use are to be built anew."""
@@ -245,16 +247,17 @@ class Outlooks:
         """A keyframe for a job, `among` those that are to be built or only beside them."""
         study = self._studies[keyframe.id.robot]
         beside = tuple(study.beside.values()) if among else ()
-        former = self._former(study, keyframe) if among else _own(study, keyframe)
-        return Sight(view_of(keyframe, keyframe.pose), self.pose(keyframe), among, beside, former, firm)
+        carried = self._carried(study, keyframe) if among else None
+        view, former = view_of(keyframe, keyframe.pose), _own(study, keyframe)
+        return Sight(view, self.pose(keyframe), among, beside, former, carried, firm)
 
-    def _former(self, study: _Study, keyframe: Keyframe) -> Surface | None:
-        """The keyframe's own surface, or that of the robot's last one carried over by the motion between them."""
-        outlook, own = study.outlook, _own(study, keyframe)
-        if outlook is None or own is not None:
-            return own
+    def _carried(self, study: _Study, keyframe: Keyframe) -> Carried | None:
+        """The surface of the robot's last outlook, and the motion since."""
+        outlook = study.outlook
+        if outlook is None or outlook.keyframe.id == keyframe.id:
+            return None
         motion = relative(outlook.keyframe.pose, keyframe.pose)
-        return warped(outlook.surface, outlook.keyframe.camera, *motion, keyframe.camera, self._surface)
+        return Carried(outlook.surface, outlook.keyframe.camera, *motion)
 
     def _take(self, name: KeyframeId, settled: Settled, matched: Mapping[KeyframeId, int]) -> Keyframe | None:
         study = self._studies.get(name.robot)
@@ -266,7 +269,8 @@ class Outlooks:
         if keyframe is study.keyframe:
             study.pose = settled.pose
         beside = {other: len(said) for other, said in study.beside.items()} if keyframe is study.keyframe else {}
-        study.outlook = Outlook(keyframe, settled.pose, settled.surface, len(settled.points), {**beside, **matched})
+        points, depths_m = len(settled.points), _depths_m(settled.surface)
+        study.outlook = Outlook(keyframe, settled.pose, settled.surface, points, {**beside, **matched}, depths_m)
         return keyframe
 
 
@@ -315,7 +319,7 @@ class Scales:
         """`joined`: indices of outlooks that share matched points."""
         parts = parts_of(len(outlooks), joined)
         centres = np.array([outlook.pose.centre_m for outlook in outlooks]).reshape(-1, 3)
-        depths = np.array([_depth_m(outlook) for outlook in outlooks])
+        depths = np.array([outlook.depths_m[1] for outlook in outlooks])
         self._known = scale_sigmas(centres, depths, parts, AdjustmentOptions().position_share)
         self._parts = parts
         self._index = {outlook.keyframe.id.robot: k for k, outlook in enumerate(outlooks)}
@@ -358,8 +362,9 @@ def _matched(event: SurfacesBuilt) -> dict[int, dict[KeyframeId, int]]:
     return matched
 
 
-def _depth_m(outlook: Outlook) -> float:
-    return 1.0 / float(np.median(outlook.surface.inverse_depth))
+def _depths_m(surface: Surface) -> Depths:
+    near, median, far = 1.0 / np.percentile(surface.inverse_depth, (95, 50, 5))
+    return float(near), float(median), float(far)
 
 
 def _partner(keyframe: Keyframe, earlier: deque[Keyframe], depth_m: float) -> Keyframe | None:

@@ -37,8 +37,7 @@ def depth_of(outlook: Outlook) -> Depth | None:
     """The depth of a keyframe by its surface, None if that rests on too few points of its own."""
     if outlook.points < _LEAST_POINTS:
         return None
-    near, median, far = np.percentile(1.0 / outlook.surface.inverse_depth, (5, 50, 95))
-    return Depth(outlook.keyframe.id, outlook.points, float(near), float(median), float(far))
+    return Depth(outlook.keyframe.id, outlook.points, *outlook.depths_m)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

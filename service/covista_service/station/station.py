@@ -230,7 +230,7 @@ class Station:
 
     def _regroup(self, now_ns: int) -> list[Effect]:
         before = self._groups.view, self._groups.similarity
-        seen = self._surveys.seen()
+        seen = self._surveys.seen() if self._groups.may_evaluate(now_ns) else ()
         effects = self._groups.evaluate(self._ungrouped(), now_ns, at_once=bool(seen))
         if (self._groups.view, self._groups.similarity) != before:
             self._snapshot = None

@@ -10,7 +10,7 @@ from covista_service.perception.comparison import Comparison
 from covista_service.perception.relative_pose import RelativePose
 from covista_service.perception.scene import Evidence, Settled
 from covista_service.perception.sightings import Sightings
-from covista_service.perception.surface import flat
+from covista_service.perception.surface import SurfaceOptions, flat
 from covista_service.station import prospects
 from covista_service.station.events import (
     BuildSurfaces,
@@ -116,6 +116,8 @@ class Scene:
         for k, sight in enumerate(job.sights):
             count = sum(said.matched for pair, said in evidence.items() if k in pair) + sum(map(len, sight.beside))
             surface = flat(1 / self.depth_m) if count else sight.former
+            if surface is None and sight.carried is not None:
+                surface = sight.carried.over(sight.view.camera, SurfaceOptions())
             points = DepthPoints(
                 np.zeros((count, 2)), *(np.full(count, value) for value in (1 / self.depth_m, 0.01, 1))
             )

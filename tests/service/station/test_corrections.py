@@ -16,7 +16,7 @@ def outlook(scene: Scene, deg: float = 0.0, m: float = 0.0) -> Outlook:
     stands = Pose(
         turn(0, np.radians(deg), 0) @ keyframe.pose.world_from_camera, keyframe.pose.centre_m + np.array([0, m, 0])
     )
-    return Outlook(keyframe, stands, flat(0.25), 40, {})
+    return Outlook(keyframe, stands, flat(0.25), 40, {}, (4.0, 4.0, 4.0))
 
 
 def texts(corrections: Corrections, outlooks: list[Outlook], again: bool = False) -> list[str]:

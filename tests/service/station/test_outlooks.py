@@ -45,7 +45,7 @@ def test_what_was_said_last_counts_and_a_forgotten_robot_does_not() -> None:
 def outlooks(*centres_m: float) -> list[Outlook]:
     scene = Scene()
     keyframes = [scene.keyframe(f"r{k}", pose(x_m)) for k, x_m in enumerate(centres_m)]
-    return [Outlook(one, Pose(np.eye(3), one.pose.centre_m), flat(0.25), 20, {}) for one in keyframes]
+    return [Outlook(one, Pose(np.eye(3), one.pose.centre_m), flat(0.25), 20, {}, (4.0, 4.0, 4.0)) for one in keyframes]
 
 
 def test_robots_that_matches_connect_have_one_scale_and_others_theirs() -> None:

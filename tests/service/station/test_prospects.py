@@ -11,7 +11,7 @@ from tests.service.station.scenes import AHEAD, BACK, NOTHING, Scene, measured, 
 
 
 def outlook(keyframe: Keyframe, points: int = 20) -> Outlook:
-    return Outlook(keyframe, keyframe.pose, flat(1 / 4.0), points, {})
+    return Outlook(keyframe, keyframe.pose, flat(1 / 4.0), points, {}, (4.0, 4.0, 4.0))
 
 
 FAR_AHEAD = Pose(AHEAD, np.array([0.0, 0.0, 50.0]))
