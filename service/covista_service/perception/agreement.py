@@ -18,6 +18,8 @@ from covista_service.perception.nearest import nearest
 
 Mask = NDArray[np.bool_]
 AGREED, SINGLE, CONTRADICTED = 1.0, 0.4, 0.1
+# Of points that an earlier keyframe of the same robot has seen.
+CARRIED = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,11 +78,22 @@ class DepthPoints:
     def __len__(self) -> int:
         return len(self.positions_px)
 
+    def beside(self, others: DepthPoints) -> DepthPoints:
+        """These and others."""
+        return DepthPoints(*(np.concatenate((getattr(self, name), getattr(others, name))) for name in self.__slots__))
+
 
 def agree(
-    observations: Sequence[Observations], keypoints_px: Floats, width_px: int, options: AgreementOptions
+    observations: Sequence[Observations],
+    keypoints_px: Floats,
+    width_px: int,
+    options: AgreementOptions,
+    known: DepthPoints | None = None,
 ) -> DepthPoints:
-    """Merge what all pairs of a keyframe say of its keypoints (k, 2), and drop singles that nothing supports."""
+    """Merge what all pairs of a keyframe say of its keypoints (k, 2), and drop singles that nothing supports.
+
+    `known` points of the same image, from elsewhere, support singles or speak against them.
+    """
     if not any(len(one) for one in observations):
         return DepthPoints(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0))
     keypoint = np.concatenate([one.keypoints for one in observations])
@@ -94,22 +107,26 @@ def agree(
         options.sigmas,
     )
     points = DepthPoints(keypoints_px[which], *np.ascontiguousarray(merged.T))
-    kept = _supported(points, free, width_px, options)
+    kept = _supported(points, free, width_px, options, known)
     return DepthPoints(*(getattr(points, name)[kept] for name in points.__slots__))
 
 
-def _supported(points: DepthPoints, free: Mask, width_px: int, options: AgreementOptions) -> Mask:
+def _supported(
+    points: DepthPoints, free: Mask, width_px: int, options: AgreementOptions, known: DepthPoints | None
+) -> Mask:
     agreed = points.confidences == AGREED
-    if agreed.sum() < options.least_agreed or agreed.mean() < options.least_agreed_share:
+    few = agreed.sum() < options.least_agreed or agreed.mean() < options.least_agreed_share
+    if few and (known is None or not len(known)):
         return np.ones(len(points), np.bool_)
-    count = min(options.neighbours + 1, len(points))
-    distance, index = nearest(points.positions_px, points.positions_px, count, options.reach * width_px)
+    mine, all_points = len(points), points if known is None else points.beside(known)
+    count = min(options.neighbours + 1, len(all_points))
+    distance, index = nearest(all_points.positions_px, points.positions_px, count, options.reach * width_px)
     share = _support(
         distance[:, 1:],
         index[:, 1:],
-        points.inverse_depths,
-        points.sigmas,
-        points.confidences,
+        all_points.inverse_depths,
+        all_points.sigmas,
+        np.maximum(all_points.confidences, SINGLE * (np.arange(len(all_points)) >= mine)),
         (options.softening * width_px) ** 2,
         options.support_tolerance,
         options.support_sigmas,
@@ -180,10 +197,10 @@ def _support(
     tolerance: float,
     sigmas: float,
 ) -> Floats:
-    """Weighted share (n,) of each point's neighbours that agree with it; an index of n is no neighbour."""
-    n, k = index.shape
-    share = np.zeros(n)
-    for i in range(n):
+    """Weighted share (m,) of the first m points' neighbours that agree with them; an index of n is no neighbour."""
+    k, n = index.shape[1], len(rho)
+    share = np.zeros(len(index))
+    for i in range(len(index)):
         agreeing, weights = 0.0, 0.0
         for c in range(k):
             j = index[i, c]

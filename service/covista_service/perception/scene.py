@@ -67,7 +67,7 @@ class Sight:
 
     One that is not `open` keeps its pose and its surface, and lends what it has. The reported pose of a `firm` one is
     borne out by others. `beside` are depths of its keypoints
-    from keyframes that are not among the others, `former` the surface that it has, `carried` one from before.
+    from keyframes that are not among the others, `former` the surface that it has, `carried` that of the robot before.
     """
 
     view: View
@@ -172,8 +172,9 @@ def settle(
     said = {pair: _observed(pair, one, sights, ideal, poses, options) for pair, one in evidence.items()}
 
     # and what all pairs of a keyframe agree on is its surface.
-    points = [_points(k, sight, ideal[k], said, options) for k, sight in enumerate(sights)]
-    surfaces = _surfaces(sights, points, said, options)
+    known = [sight.carried.points(sight.view.camera) if sight.open and sight.carried else None for sight in sights]
+    points = [_points(k, sight, ideal[k], said, known[k], options) for k, sight in enumerate(sights)]
+    surfaces = _surfaces(sights, points, known, said, options)
     return [Settled(*one) for one in zip(poses, surfaces, points, strict=True)], said
 
 
@@ -237,28 +238,38 @@ def _observed(
 
 
 def _points(
-    k: int, sight: Sight, ideal: Floats, evidence: Mapping[Pair, Evidence], options: SceneOptions
+    k: int,
+    sight: Sight,
+    ideal: Floats,
+    evidence: Mapping[Pair, Evidence],
+    known: DepthPoints | None,
+    options: SceneOptions,
 ) -> DepthPoints:
     said = [one.observed[pair.index(k)] for pair, one in evidence.items() if k in pair and one.observed is not None]
     if not sight.open:
         said = []
-    return agree([*said, *sight.beside], ideal, sight.view.camera.width, options.agreement)
+    return agree([*said, *sight.beside], ideal, sight.view.camera.width, options.agreement, known)
 
 
 def _surfaces(
-    sights: Sequence[Sight], points: Sequence[DepthPoints], pairs: Mapping[Pair, Evidence], options: SceneOptions
+    sights: Sequence[Sight],
+    points: Sequence[DepthPoints],
+    known: Sequence[DepthPoints | None],
+    pairs: Mapping[Pair, Evidence],
+    options: SceneOptions,
 ) -> list[Surface | None]:
-    """Own surfaces; without points the former one, or the median inverse depth of those that it is compared with."""
-    known = {k: depth for k, sight in enumerate(sights) if (depth := _median(sight, points[k], options)) is not None}
+    """Own surfaces, with what was carried over where that is not told anew; without either, the former one.
+
+    Else the median inverse depth of those that a keyframe is compared with.
+    """
+    medians = {k: depth for k, sight in enumerate(sights) if (depth := _median(sight, points[k], options)) is not None}
     surfaces: list[Surface | None] = []
-    for k, (sight, own) in enumerate(zip(sights, points, strict=True)):
-        surface = sight.former
-        if sight.open and len(own) >= options.least_points:
-            surface = interpolate(own, sight.view.camera, options.surface, sight.view.thumbnail)
-        elif surface is None and sight.carried is not None:
-            surface = sight.carried.over(sight.view.camera, options.surface)
+    for k, (sight, own, carried) in enumerate(zip(sights, points, known, strict=True)):
+        surface, told = sight.former, own if carried is None else own.beside(carried)
+        if sight.open and len(told) >= options.least_points:
+            surface = interpolate(told, sight.view.camera, options.surface, sight.view.thumbnail)
         if surface is None:
-            others = [known[other] for pair in pairs if k in pair for other in pair if other in known]
+            others = [medians[other] for pair in pairs if k in pair for other in pair if other in medians]
             surface = flat(float(np.median(others))) if others else None
         surfaces.append(surface)
     return surfaces

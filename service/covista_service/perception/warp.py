@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from covista_service.perception.agreement import SINGLE, DepthPoints
+from covista_service.perception.agreement import CARRIED, DepthPoints
 from covista_service.perception.camera import Camera, Floats
 from covista_service.perception.surface import Surface, SurfaceOptions, cell_centres, interpolate
 
@@ -15,6 +15,8 @@ _STRIDE = 3
 _AHEAD = 1e-9
 # How far beyond the new image, in widths, a point still says something of the cells at its border.
 _BEYOND = 0.25
+# What is carried over grows this much less sure each time, as a share of the depth, to no more than the second.
+_DOUBT, _MOST_DOUBT = 0.05, 0.3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,15 +28,17 @@ class Carried:
     rotation: Floats
     translation: Floats
 
+    def points(self, to: Camera) -> DepthPoints:
+        """Some points of the surface as the other camera sees them, less sure than they were; perhaps none."""
+        return _carried(self.surface, self.camera, self.rotation, self.translation, to)
+
     def over(self, to: Camera, options: SurfaceOptions) -> Surface | None:
-        """The surface in the other view."""
-        return warped(self.surface, self.camera, self.rotation, self.translation, to, options)
+        """The surface in the other view; None if none of it lies before that camera."""
+        points = self.points(to)
+        return interpolate(points, to, options) if len(points) else None
 
 
-def warped(
-    surface: Surface, camera: Camera, rotation: Floats, translation: Floats, to: Camera, options: SurfaceOptions
-) -> Surface | None:
-    """The surface as a second camera sees it, X_2 = R X_1 + t; None if none of it lies before that camera."""
+def _carried(surface: Surface, camera: Camera, rotation: Floats, translation: Floats, to: Camera) -> DepthPoints:
     grid = np.zeros(surface.inverse_depth.shape, np.bool_)
     grid[_STRIDE // 2 :: _STRIDE, _STRIDE // 2 :: _STRIDE] = True
     rho, sigma = surface.inverse_depth[grid], surface.sigma[grid]
@@ -47,8 +51,6 @@ def warped(
     seen = (there / there[:, 2:]) @ to.matrix.T
     margin = _BEYOND * to.width
     near = (seen[:, :2] > -margin).all(axis=1) & (seen[:, 0] < to.width + margin) & (seen[:, 1] < to.height + margin)
-    if not near.any():
-        return None
     depths = (rho / there[:, 2])[near]
-    confidences = np.full(len(depths), SINGLE)
-    return interpolate(DepthPoints(seen[near, :2], depths, sigma[near] * depths, confidences), to, options)
+    sigmas = np.minimum(np.hypot(sigma[near], _DOUBT), _MOST_DOUBT) * depths
+    return DepthPoints(seen[near, :2], depths, sigmas, np.full(len(depths), CARRIED))

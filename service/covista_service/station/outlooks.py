@@ -26,6 +26,9 @@ _WINDOW = 4
 # A robot's own motion tells depths if it is so large a share of the depth; the nearest to the middle is taken.
 _LEAST_BASELINE, _BEST_BASELINE, _MOST_BASELINE = 0.02, 0.1, 0.4
 
+# A robot alone has seen others before, or moved itself: the scale of its depths is not just any.
+_MOST_SCALE = 0.15
+
 Names = tuple[KeyframeId, KeyframeId]
 # Least and greatest ratio of the scales of two keyframes' depths.
 Ratios = tuple[float, float]
@@ -50,11 +53,15 @@ class Outlook:
 
 @dataclass(slots=True, eq=False)
 class _Study:
-    """What is known of a robot: `keyframe` is the newest in use, `outlook` the newest that has a surface."""
+    """What is known of a robot: `keyframe` is the newest in use, `outlook` the newest that has a surface.
+
+    `carried` is what the robot saw before that keyframe.
+    """
 
     keyframe: Keyframe
     pose: Pose
     outlook: Outlook | None = None
+    carried: Carried | None = None
     beside: dict[KeyframeId, Observations] = field(default_factory=dict)
     earlier: deque[Keyframe] = field(default_factory=lambda: deque(maxlen=_WINDOW))
 
@@ -101,8 +108,10 @@ class Outlooks:
         study = self._studies[robot] = _Study(keyframe, keyframe.pose)
         if held is None:
             return None
-        study.outlook = held.outlook
-        study.earlier = held.earlier
+        study.outlook, study.earlier = held.outlook, held.earlier
+        if held.outlook is not None:
+            motion = relative(held.outlook.keyframe.pose, keyframe.pose)
+            study.carried = Carried(held.outlook.surface, held.outlook.keyframe.camera, *motion)
         study.earlier.append(replace(held.keyframe, image=None))
         self._retire(held.keyframe.id)
         return None if held.outlook is None else _partner(keyframe, study.earlier, held.outlook.depths_m[1])
@@ -247,17 +256,9 @@ class Outlooks:
         """A keyframe for a job, `among` those that are to be built or only beside them."""
         study = self._studies[keyframe.id.robot]
         beside = tuple(study.beside.values()) if among else ()
-        carried = self._carried(study, keyframe) if among else None
+        carried = study.carried if among else None
         view, former = view_of(keyframe, keyframe.pose), _own(study, keyframe)
         return Sight(view, self.pose(keyframe), among, beside, former, carried, firm)
-
-    def _carried(self, study: _Study, keyframe: Keyframe) -> Carried | None:
-        """The surface of the robot's last outlook, and the motion since."""
-        outlook = study.outlook
-        if outlook is None or outlook.keyframe.id == keyframe.id:
-            return None
-        motion = relative(outlook.keyframe.pose, keyframe.pose)
-        return Carried(outlook.surface, outlook.keyframe.camera, *motion)
 
     def _take(self, name: KeyframeId, settled: Settled, matched: Mapping[KeyframeId, int]) -> Keyframe | None:
         study = self._studies.get(name.robot)
@@ -320,7 +321,8 @@ class Scales:
         parts = parts_of(len(outlooks), joined)
         centres = np.array([outlook.pose.centre_m for outlook in outlooks]).reshape(-1, 3)
         depths = np.array([outlook.depths_m[1] for outlook in outlooks])
-        self._known = scale_sigmas(centres, depths, parts, AdjustmentOptions().position_share)
+        known = scale_sigmas(centres, depths, parts, AdjustmentOptions().position_share)
+        self._known = np.minimum(known, _MOST_SCALE)
         self._parts = parts
         self._index = {outlook.keyframe.id.robot: k for k, outlook in enumerate(outlooks)}
 

@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from covista_service.perception.agreement import Observations
 from covista_service.perception.camera import Pose
 from covista_service.perception.comparison import ComparisonOptions, Outcome, compare
 from covista_service.perception.scene import Evidence, SceneOptions, Settled, Sight, settle
 from covista_service.perception.surface import flat
+from covista_service.perception.warp import Carried
 
 from tests.service.perception.scenes import turn
 from tests.service.perception.swarms import moved, points_on_wall, side_by_side, views
@@ -84,3 +86,39 @@ def test_depths_from_keyframes_that_are_gone_count_as_well() -> None:
 def test_outcomes_have_names() -> None:
     assert compare(SEEN[0], SEEN[1], ComparisonOptions()).outcome is Outcome.MEASURED
     assert compare(SEEN[0], SEEN[1], ComparisonOptions(min_matches=10_000)).outcome is Outcome.FEW_MATCHES
+
+
+def test_few_wrong_points_do_not_undo_what_was_seen_before() -> None:
+    """Some points of one pair that put a wall of six metres at twenty speak against all that was known."""
+    random = np.random.default_rng(2)
+    chosen = random.choice(len(SEEN[1].features.keypoints_px), 20, replace=False)
+    wrong = Observations(chosen, np.full(20, 1 / 20), np.full(20, 1e-3), np.ones(20, np.bool_))
+    (right,), _ = settle([Sight(SEEN[1], POSES[1], True, tuple(both_of(1)))], {}, OPTIONS)
+    assert right.surface is not None
+    before = Carried(right.surface, SEEN[1].camera, np.eye(3), np.zeros(3))
+    (alone,), _ = settle([Sight(SEEN[1], POSES[1], True, (wrong,))], {}, OPTIONS)
+    (held,), _ = settle([Sight(SEEN[1], POSES[1], True, (wrong,), None, before)], {}, OPTIONS)
+    assert alone.surface is not None
+    assert np.median(1 / alone.surface.inverse_depth) > 15
+    assert held.surface is not None
+    np.testing.assert_allclose(held.surface.inverse_depth, right.surface.inverse_depth, rtol=0.1)
+
+
+def test_what_many_points_tell_anew_counts_more_than_what_was_before() -> None:
+    before = Carried(flat(1 / 3), SEEN[1].camera, np.eye(3), np.zeros(3))
+    settled, _ = settle(
+        [Sight(SEEN[0], POSES[0]), Sight(SEEN[1], POSES[1], True, (), None, before), Sight(SEEN[2], POSES[2])],
+        evidence((0, 1), (1, 2)),
+        OPTIONS,
+    )
+    without, _ = settle([Sight(view, view.pose) for view in SEEN[:3]], evidence((0, 1), (1, 2)), OPTIONS)
+    one, other = settled[1].surface, without[1].surface
+    assert one is not None
+    assert other is not None
+    assert np.median(np.abs(one.inverse_depth / other.inverse_depth - 1)) < 0.02
+
+
+def both_of(k: int) -> list[Observations]:
+    """Depths that its neighbours give keyframe `k`."""
+    _, said = settle(sights(), evidence((k - 1, k), (k, k + 1)), OPTIONS)
+    return [one.observed[pair.index(k)] for pair, one in said.items() if one.observed is not None]

@@ -57,7 +57,9 @@ def test_robots_that_matches_connect_have_one_scale_and_others_theirs() -> None:
     assert 1.05 < most < 1.6
 
 
-def test_a_robot_alone_may_have_any_scale() -> None:
+def test_a_robot_alone_has_no_scale_but_that_of_its_own_past() -> None:
+    """Nothing tells its own; what it has seen before and how it moved bounds it, or walls would be taken for scales."""
     scales = Scales(outlooks(0.0, 1.0, 2.0), [(0, 1)])
     least, most = scales.ratios("r2", "r0")
-    assert most > 1000 * least
+    assert 1.5 < most < 2
+    assert least == pytest.approx(1 / most)
