@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import chain, combinations
 
+from covista_schemas.features import DEFAULT_COUNT
+
 from covista_service.bench.row import Row, alternately_ms, median, spread
 from covista_service.bench.scene import views
 from covista_service.bench.threads import one_thread
@@ -17,7 +19,7 @@ from covista_service.perception.scene import SceneOptions
 from covista_service.perception.surface import interpolate
 
 # Features of a keyframe, and the time that its surface may take.
-MARKS_MS = {500: 5.0, 1000: 5.0}
+MARKS_MS = {DEFAULT_COUNT: 5.0, 500: 5.0}
 _ROUNDS, _LONG_ROUNDS = 15, 80
 _LEAST_POINTS = 50
 
@@ -42,9 +44,10 @@ class _Observed:
 
 
 def rows(long: bool) -> Iterator[Row]:
-    """`survey/surface_500` and `survey/surface_1000`: what pairs agree on and the surface through it, on one core.
+    """`survey/surface` and `survey/surface_500`: what pairs agree on and the surface through it, on one core.
 
-    Of either, how long its two stages take: `surface_500_agree`, `surface_500_interpolate`.
+    With the usual number of features, and with 500. Of either, how long its two stages take: `surface_agree`,
+    `surface_interpolate`.
     """
     with one_thread():
         for count, mark_ms in MARKS_MS.items():
@@ -63,7 +66,7 @@ def _surface(count: int, mark_ms: float, rounds: int) -> Iterator[Row]:
         taken = list(chain(*times[k::3]))
         yield Row(
             bench="survey",
-            case=f"surface_{count}{stage}",
+            case=f"surface{'' if count == DEFAULT_COUNT else f'_{count}'}{stage}",
             median=median(taken),
             spread=spread(taken),
             unit="ms",
