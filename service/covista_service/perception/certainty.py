@@ -25,11 +25,11 @@ class CertaintyOptions:
     """
 
     floor: float = 0.004
-    apart: float = 2.2
-    before: float = 1.22
-    hidden: float = 0.276
-    edge: float = 0.162
-    nine_in_ten: float = 2.04
+    apart: float = 1.69
+    before: float = 1.31
+    hidden: float = 0.284
+    edge: float = 0.36
+    nine_in_ten: float = 1.87
 
     @property
     def weights(self) -> tuple[float, ...]:
