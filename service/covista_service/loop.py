@@ -41,6 +41,8 @@ from covista_service.station.station import Station
 from covista_service.telemetry import Telemetry
 
 TICK_S = 0.25
+# While news of keyframes waits to be evaluated.
+SOON_S = 0.02
 # Mail of so many robots is opened before workers' results and other tasks get their turn.
 BATCH = 32
 WORKER_FAILED = "worker_failed"
@@ -128,7 +130,7 @@ class Loop:
         self._source.attach(self.wake)
         while True:
             try:
-                async with asyncio.timeout(TICK_S):
+                async with asyncio.timeout(SOON_S if self._station.waits else TICK_S):
                     await self._awake.wait()
             except TimeoutError:
                 pass
@@ -206,18 +208,25 @@ class Loop:
     def _act(self, effect: Effect) -> None:
         match effect:
             case ExtractFeatures(keyframe):
-                self._start(self._crew.extract(keyframe), lambda done: _extracted(keyframe, done))
+                self._start(lambda: self._crew.extract(keyframe), lambda done: _extracted(keyframe, done))
             case SurveyPair():
-                self._start(self._crew.survey(effect), lambda done: _surveyed(effect, done))
+                self._start(lambda: self._crew.survey(effect), lambda done: _surveyed(effect, done))
             case BuildSurfaces():
-                self._start(self._crew.build(effect), lambda done: _built(effect, done))
+                self._start(lambda: self._crew.build(effect), lambda done: _built(effect, done))
             case GroupsEvaluated(keyframes):
                 now_ns = self._clock()
                 for _, arrived_ns in keyframes:
                     self._telemetry.grouped((now_ns - arrived_ns) / _NS_PER_S)
 
-    def _start(self, job: Future[_T], event_of: Callable[[Future[_T]], Event]) -> None:
+    def _start(self, submit: Callable[[], Future[_T]], event_of: Callable[[Future[_T]], Event]) -> None:
         self._telemetry.started()
+        try:
+            job = submit()
+        except Exception as error:
+            # A job that cannot even be handed over has failed like any other: the station must have it back.
+            log.exception("a job could not be handed over")
+            job = Future()
+            job.set_exception(error)
         job.add_done_callback(lambda done: self._finish(done, event_of))
 
     def _finish(self, done: Future[_T], event_of: Callable[[Future[_T]], Event]) -> None:

@@ -53,10 +53,13 @@ class Workers:
     def __init__(self, options: WorkersOptions) -> None:
         self._options = options
         self._lock = threading.Lock()
+        self._closed = False
         self._pool = _pool(options)
         # Processes take a second or two to start, and compiled code to load: now is better than when the first robot
         # waits. Threads share what one of them has loaded.
         self._warming = [self._submit(warm_up) for _ in range(1 if options.kind == "threads" else options.count)]
+        for one in self._warming:
+            one.add_done_callback(_tell_failure)
 
     @property
     def warm(self) -> bool:
@@ -87,6 +90,7 @@ class Workers:
 
     def close(self) -> None:
         """Let jobs under way end, and drop those that wait."""
+        self._closed = True
         self._pool.shutdown(wait=True, cancel_futures=True)
 
     def _submit(self, job: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> Future[_T]:
@@ -99,10 +103,17 @@ class Workers:
                 self._pool = _pool(self._options)
                 return self._pool.submit(job, *args, **kwargs)
             except RuntimeError:
-                # Closed: nobody waits for this job any more.
+                if not self._closed:
+                    raise
+                # Nobody waits for this job any more.
                 cancelled: Future[_T] = Future()
                 cancelled.cancel()
                 return cancelled
+
+
+def _tell_failure(warming: Future[None]) -> None:
+    if not warming.cancelled() and (failure := warming.exception()) is not None:
+        log.warning("compiled code could not be loaded ahead; the first keyframes will wait for it", exc_info=failure)
 
 
 def extract(image: bytes, width: int, height: int) -> tuple[Features, bytes | None]:

@@ -28,15 +28,16 @@ class AgreementOptions:
 
     A point that was seen once stays if enough of its `neighbours` within `reach` image widths, weighted by confidence
     and nearness (softened by `softening` widths), agree with it: `support_free` if its match was found without the
-    geometry, else `support_guided`. Only where at least `least_agreed` keypoints, and that share of all, are agreed:
-    else singles are all there is.
+    geometry, else `support_guided`. A keypoint that is there twice, within `apart_px`, is no neighbour of itself. Only
+    where at least `least_agreed` keypoints, and that share of all, are agreed: else singles are all there is.
     """
 
     tolerance: float = 0.03
     sigmas: float = 3.0
-    neighbours: int = 12
+    neighbours: int = 8
     reach: float = 0.2
     softening: float = 0.03
+    apart_px: float = 0.5
     support_tolerance: float = 0.10
     support_sigmas: float = 2.0
     support_free: float = 0.4
@@ -119,15 +120,17 @@ def _supported(
     if few and (known is None or not len(known)):
         return np.ones(len(points), np.bool_)
     mine, all_points = len(points), points if known is None else points.beside(known)
-    count = min(options.neighbours + 1, len(all_points))
+    count = min(2 * options.neighbours + 1, len(all_points))
     distance, index = nearest(all_points.positions_px, points.positions_px, count, options.reach * width_px)
     share = _support(
-        distance[:, 1:],
-        index[:, 1:],
+        distance,
+        index,
         all_points.inverse_depths,
         all_points.sigmas,
         np.maximum(all_points.confidences, SINGLE * (np.arange(len(all_points)) >= mine)),
         (options.softening * width_px) ** 2,
+        options.apart_px,
+        options.neighbours,
         options.support_tolerance,
         options.support_sigmas,
     )
@@ -194,18 +197,23 @@ def _support(
     sigma: Floats,
     confidence: Floats,
     softening: float,
+    apart: float,
+    most: int,
     tolerance: float,
     sigmas: float,
 ) -> Floats:
-    """Weighted share (m,) of the first m points' neighbours that agree with them; an index of n is no neighbour."""
+    """Weighted share (m,) of the first m points' `most` neighbours that agree with them; an index of n is nobody."""
     k, n = index.shape[1], len(rho)
     share = np.zeros(len(index))
     for i in range(len(index)):
-        agreeing, weights = 0.0, 0.0
+        agreeing, weights, met = 0.0, 0.0, 0
         for c in range(k):
             j = index[i, c]
-            if j >= n:
+            if j >= n or met == most:
                 break
+            if distance[i, c] <= apart:
+                continue
+            met += 1
             weight = confidence[j] / (distance[i, c] ** 2 + softening)
             weights += weight
             if abs(rho[j] - rho[i]) < tolerance * rho[i] + sigmas * np.sqrt(sigma[i] ** 2 + sigma[j] ** 2):

@@ -84,9 +84,9 @@ def _with_guided(pair: Matched, F: Floats, options: DepthOptions, seed: int) -> 
         chance = len(_guided(pair, F, options, shuffled))
         if len(guided) <= options.guided.chance_factor * chance + options.guided.chance_margin:
             return free[:0], np.zeros(0, np.bool_)
-    taken = set(map(tuple, free.tolist()))
-    new = [match for match in guided.tolist() if tuple(match) not in taken]
-    matches = np.concatenate((free, np.array(new, np.int64).reshape(-1, 2)))
+    # A keypoint that is there twice, with two orientations, must not bear itself out.
+    new = ~(np.isin(guided[:, 0], free[:, 0]) | np.isin(guided[:, 1], free[:, 1]))
+    matches = np.concatenate((free, guided[new]))
     return matches, np.arange(len(matches)) < len(free)
 
 

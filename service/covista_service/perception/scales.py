@@ -29,14 +29,28 @@ def scale_sigmas(centres_m: Floats, depths_m: Floats, parts: NDArray[np.int64], 
     to them it has the relative variance sigma^2 / sum |C - mean C|^2. `depths_m` (n,), NaN where unknown, as in a part
     without a spread: there any factor will do.
     """
-    sigmas = np.full(len(parts), _ANY)
-    for part in np.unique(parts):
-        members = parts == part
-        known = depths_m[members & np.isfinite(depths_m)]
-        spread = float(np.linalg.norm(centres_m[members] - centres_m[members].mean(axis=0)))
-        if len(known) and spread > 0:
-            sigmas[members] = min(position_share * float(np.median(known)) / spread, _ANY)
-    return sigmas
+    count = int(parts.max()) + 1 if len(parts) else 0
+    sizes = np.bincount(parts, minlength=count)
+    means = np.column_stack([np.bincount(parts, axis, count) for axis in centres_m.T]) / np.maximum(sizes, 1)[:, None]
+    spreads = np.sqrt(np.bincount(parts, ((centres_m - means[parts]) ** 2).sum(axis=1), count))
+    medians = _medians(depths_m, parts, count)
+    told = (spreads > 0) & np.isfinite(medians)
+    sigmas = np.full(count, _ANY)
+    sigmas[told] = np.minimum(position_share * medians[told] / spreads[told], _ANY)
+    return sigmas[parts]
+
+
+def _medians(values: Floats, parts: NDArray[np.int64], count: int) -> Floats:
+    """Median (count,) of the finite values of each part, NaN where there are none."""
+    finite = np.isfinite(values)
+    values, parts = values[finite], parts[finite]
+    ordered = values[np.lexsort((values, parts))]
+    sizes = np.bincount(parts, minlength=count)
+    starts, some = np.cumsum(sizes) - sizes, sizes > 0
+    medians = np.full(count, np.nan)
+    lower, upper = (starts + (sizes - 1) // 2)[some], (starts + sizes // 2)[some]
+    medians[some] = (ordered[lower] + ordered[upper]) / 2
+    return medians
 
 
 def ratio_range(one_sigma: float, other_sigma: float, sigmas: float) -> tuple[float, float]:

@@ -94,12 +94,12 @@ class Agenda:
 
     def again(self, pair: Pair) -> None:
         """Put a pair back in the queue if one of its keyframes is newer than its last survey."""
-        if pair[1] in self._partners[pair[0]]:
+        if pair[1] in self.partners(pair[0]):
             self._enqueue(pair)
 
-    def under_way(self, keyframe: Keyframe) -> bool:
+    def under_way(self, name: KeyframeId) -> bool:
         """Is a survey of this keyframe under way?"""
-        return any(keyframe in keyframes for keyframes in self._in_flight.values())
+        return any(name == keyframe.id for keyframes in self._in_flight.values() for keyframe in keyframes)
 
     def forget(self, robot: str) -> None:
         """Take a robot off; what comes of its surveys under way is of no interest any more."""
@@ -148,10 +148,10 @@ class Agenda:
 
     def _next_fresh(self) -> Pair | None:
         for robot in list(self._fresh):
-            due = [pair for pair in (pair_of(robot, other) for other in self._partners[robot]) if self._due(pair)]
+            due = [pair for pair in (pair_of(robot, other) for other in self.partners(robot)) if self._due(pair)]
             if due:
                 return min(due, key=self._promise)
-            if not self._partners[robot]:
+            if not self.partners(robot):
                 del self._fresh[robot]
         return None
 
@@ -169,7 +169,7 @@ class Agenda:
             if tried_ns != self._tried_ns.get(pair, 0):
                 # Another queue has given it a turn meanwhile.
                 self._enqueue(pair)
-            elif pair[1] in self._partners[pair[0]] and self._due(pair):
+            elif pair[1] in self.partners(pair[0]) and self._due(pair):
                 return pair
         return None
 

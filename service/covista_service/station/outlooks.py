@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 
@@ -83,10 +83,13 @@ class Outlooks:
     def __init__(self) -> None:
         self._studies: dict[str, _Study] = {}
         self._evidence: dict[Names, Evidence] = {}
-        # Robots whose surface is to be built anew, those at a worker, and jobs under way.
+        # The same by keyframe, in order of arrival.
+        self._names: dict[KeyframeId, dict[Names, None]] = {}
+        # Robots whose surface is to be built anew, keyframes at a worker, and jobs under way.
         self._stale: dict[str, None] = {}
+        self._at_work: dict[str, KeyframeId] = {}
         self._agreements = Agreements()
-        self._at_work: set[str] = set()
+        self._scales: Scales | None = None
         self.under_way = 0
 
     def __getitem__(self, robot: str) -> Outlook | None:
@@ -96,10 +99,9 @@ class Outlooks:
     def __iter__(self) -> Iterator[Outlook]:
         return (study.outlook for study in self._studies.values() if study.outlook is not None)
 
-    def building(self, keyframe: Keyframe) -> bool:
-        """Is the surface of this keyframe on its way, or waiting for its turn?"""
-        study = self._studies.get(keyframe.id.robot)
-        return keyframe.id.robot in self._at_work or (study is not None and keyframe.id.robot in self._stale)
+    def building(self, name: KeyframeId) -> bool:
+        """Is the surface of this keyframe on its way?"""
+        return self._at_work.get(name.robot) == name
 
     def keyframe(self, keyframe: Keyframe) -> Keyframe | None:
         """Take a robot's new keyframe; the earlier one to hold it against, if its motion tells depths."""
@@ -110,8 +112,7 @@ class Outlooks:
             return None
         study.outlook, study.earlier = held.outlook, held.earlier
         if held.outlook is not None:
-            motion = relative(held.outlook.keyframe.pose, keyframe.pose)
-            study.carried = Carried(held.outlook.surface, held.outlook.keyframe.camera, *motion)
+            study.carried = _carried(held.outlook.surface, held.outlook.keyframe, keyframe)
         study.earlier.append(replace(held.keyframe, image=None))
         self._retire(held.keyframe.id)
         return None if held.outlook is None else _partner(keyframe, study.earlier, held.outlook.depths_m[1])
@@ -120,9 +121,9 @@ class Outlooks:
         """Take what a survey found, None if it failed; surfaces of its keyframes still in use are to be built anew."""
         current = [name for name in (first, second) if self._current(name)]
         if evidence is not None and current:
-            self._evidence[first, second] = evidence
+            self._put((first, second), evidence)
             if len(current) == 2 and evidence.link is not None and self._as_reported(*current):
-                self._agreements.note(first.robot, second.robot, agree=not evidence.link.contradicts)
+                self._agreements.note(first, second, agree=not evidence.link.contradicts)
         for name in current:
             self._stale.setdefault(name.robot)
 
@@ -142,11 +143,11 @@ class Outlooks:
         for robot in list(self._stale):
             if len(jobs) >= hands:
                 break
-            if robot in self._stale and robot not in self._at_work:
+            if robot in self._stale and robot not in self._at_work and not self._waits(robot):
                 together = [robot, *self._fresh_partner(robot)]
                 for one in together:
                     self._stale.pop(one, None)
-                self._at_work.update(together)
+                    self._at_work[one] = self._studies[one].keyframe.id
                 jobs.append(self._job(together))
         self.under_way += len(jobs)
         return jobs
@@ -155,7 +156,8 @@ class Outlooks:
         """Take what was built; the keyframes that have an outlook of their own since."""
         self.under_way -= 1
         opened = [(k, name) for k, name in enumerate(event.job.keyframes) if event.job.sights[k].open]
-        self._at_work.difference_update(name.robot for _, name in opened)
+        for _, name in opened:
+            self._at_work.pop(name.robot, None)
         if event.settled is None:
             return []
         matched = _matched(event)
@@ -165,7 +167,12 @@ class Outlooks:
         return [keyframe for keyframe in taken if keyframe is not None]
 
     def scales(self) -> Scales:
-        """Which robots' depths have one scale, and how well each is known."""
+        """Which robots' depths have one scale, and how well each is known; made anew when an outlook is."""
+        if self._scales is None:
+            self._scales = self._weighed()
+        return self._scales
+
+    def _weighed(self) -> Scales:
         outlooks = list(self)
         index = {outlook.keyframe.id.robot: k for k, outlook in enumerate(outlooks)}
         joined = [
@@ -181,6 +188,7 @@ class Outlooks:
         study = self._studies.pop(robot, None)
         self._stale.pop(robot, None)
         self._agreements.forget(robot)
+        self._scales = None
         if study is not None:
             self._retire(study.keyframe.id)
 
@@ -191,11 +199,24 @@ class Outlooks:
         study = self._studies.get(name.robot)
         return study is not None and study.keyframe.id == name
 
+    def _put(self, names: Names, said: Evidence) -> None:
+        self._evidence[names] = said
+        for name in names:
+            self._names.setdefault(name, {})[names] = None
+
+    def _drop(self, names: Names) -> Evidence:
+        for name in names:
+            beside = self._names[name]
+            beside.pop(names)
+            if not beside:
+                del self._names[name]
+        return self._evidence.pop(names)
+
     def _keep(self, names: Names, said: Evidence) -> None:
         """Keep what a job made of evidence: with keyframes that are replaced, the depths alone."""
         if names not in self._evidence:
             return
-        self._evidence[names] = said
+        self._put(names, said)
         for name in names:
             if not self._current(name):
                 self._retire(name)
@@ -205,20 +226,32 @@ class Outlooks:
 
         What no surface has been built with yet waits for that.
         """
-        for names in [names for names in self._evidence if name in names]:
+        for names in list(self._names.get(name, ())):
             side = 1 - names.index(name)
             said, other = self._evidence[names], names[side]
             if not self._current(other):
-                del self._evidence[names]
+                self._drop(names)
             elif said.observed is not None:
-                del self._evidence[names]
+                self._drop(names)
                 self._studies[other.robot].lay_beside(name, said.observed[side])
+
+    def _waits(self, robot: str) -> bool:
+        """Is one whose images contradict this robot's at a worker? The two are settled together, or not at all."""
+        name = self._studies[robot].keyframe.id
+        return any(
+            said.observed is None
+            and said.link is not None
+            and said.link.contradicts
+            and any(one.robot != robot and one.robot in self._at_work for one in names)
+            for names in self._names.get(name, ())
+            for said in (self._evidence[names],)
+        )
 
     def _fresh_partner(self, robot: str) -> list[str]:
         """Another robot that is stale too, by a survey of the two that no surface has been built with yet."""
         name = self._studies[robot].keyframe.id
-        for names, said in reversed(self._evidence.items()):
-            if name in names and said.observed is None:
+        for names in reversed(self._names.get(name, {})):
+            if self._evidence[names].observed is None:
                 other = names[1 - names.index(name)].robot
                 if other != robot and other in self._stale and other not in self._at_work:
                     return [other]
@@ -229,15 +262,15 @@ class Outlooks:
         opened = [self._studies[robot].keyframe for robot in robots]
         held = {keyframe.id: keyframe for keyframe in opened}
         evidence: dict[Names, Evidence] = {}
-        for names in [names for names in self._evidence if any(keyframe.id in names for keyframe in opened)]:
+        for names in list(dict.fromkeys(names for keyframe in opened for names in self._names.get(keyframe.id, ()))):
             pair = [self._find(name) for name in names]
             if None in pair:  # replaced so often that it is held no longer
-                del self._evidence[names]
+                self._drop(names)
                 continue
             held.update({keyframe.id: keyframe for keyframe in pair if keyframe is not None})
             evidence[names] = self._evidence[names]
         index = {name: k for k, name in enumerate(held)}
-        count, borne_out = len(opened), self._agreements.borne_out()
+        count, borne_out = len(opened), self._agreements.borne_out(lambda name: self._find(name) is not None)
         return BuildSurfaces(
             tuple(held),
             tuple(
@@ -269,6 +302,10 @@ class Outlooks:
             return None
         if keyframe is study.keyframe:
             study.pose = settled.pose
+        else:
+            # A newer one has come meanwhile: that is what its robot saw before.
+            study.carried = _carried(settled.surface, keyframe, study.keyframe)
+        self._scales = None
         beside = {other: len(said) for other, said in study.beside.items()} if keyframe is study.keyframe else {}
         points, depths_m = len(settled.points), _depths_m(settled.surface)
         study.outlook = Outlook(keyframe, settled.pose, settled.surface, points, {**beside, **matched}, depths_m)
@@ -286,20 +323,22 @@ class Agreements:
     """Which robots' reported poses the images of which others bear out."""
 
     def __init__(self) -> None:
-        self._agree: dict[tuple[str, str], bool] = {}
+        self._agree: dict[tuple[str, str], tuple[Names, bool]] = {}
 
-    def note(self, one: str, other: str, *, agree: bool) -> None:
+    def note(self, first: KeyframeId, second: KeyframeId, *, agree: bool) -> None:
         """Enter whether the images of two robots agree with what the two have reported."""
-        self._agree[one, other] = agree
+        self._agree[first.robot, second.robot] = ((first, second), agree)
 
-    def borne_out(self) -> AbstractSet[str]:
+    def borne_out(self, held: Callable[[KeyframeId], bool]) -> AbstractSet[str]:
         """The largest set of robots that are connected by agreement: who contradicts them is taken to be wrong.
 
-        Nobody where no set is larger than all others.
+        Nobody where no set is larger than all others. Only keyframes that are still `held` bear witness: a robot that
+        was right long ago may have lost its way.
         """
-        names = sorted({name for pair in self._agree for name in pair})
+        said = {pair: agree for pair, (names, agree) in self._agree.items() if all(map(held, names))}
+        names = sorted({name for pair in said for name in pair})
         index = {name: k for k, name in enumerate(names)}
-        parts = parts_of(len(names), [(index[a], index[b]) for (a, b), agree in self._agree.items() if agree])
+        parts = parts_of(len(names), [(index[a], index[b]) for (a, b), agree in said.items() if agree])
         if not len(parts):
             return frozenset()
         sizes = np.bincount(parts)
@@ -310,7 +349,7 @@ class Agreements:
 
     def forget(self, robot: str) -> None:
         """Drop a robot."""
-        self._agree = {pair: agree for pair, agree in self._agree.items() if robot not in pair}
+        self._agree = {pair: said for pair, said in self._agree.items() if robot not in pair}
 
 
 class Scales:
@@ -347,6 +386,10 @@ def masks(first: Outlook, second: Outlook, ratios: Ratios) -> tuple[Mask, Mask]:
 
 def _inverse(ratios: Ratios) -> Ratios:
     return 1 / ratios[1], 1 / ratios[0]
+
+
+def _carried(surface: Surface, seen: Keyframe, to: Keyframe) -> Carried:
+    return Carried(surface, seen.camera, *relative(seen.pose, to.pose))
 
 
 def _own(study: _Study, keyframe: Keyframe) -> Surface | None:

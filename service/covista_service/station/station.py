@@ -76,6 +76,11 @@ class Station:
                 return self._tick(now_ns)
         return []
 
+    @property
+    def waits(self) -> bool:
+        """Is there news that the next evaluation waits for, and that should not wait for the next event?"""
+        return self._surveys.news
+
     def set_grouping(self, options: GroupingOptions) -> None:
         """Group by other settings from the next Tick on."""
         self.options = replace(self.options, grouping=options)

@@ -48,18 +48,19 @@ class Surveys:
         self._corrections = Corrections()
         self._to_judge: dict[str, None] = {}
         self._reaches: dict[str, prospects.Reach] = {}
-        # Keyframes in use that no survey has seen yet, and those whose first survey is in since the last evaluation.
-        self._unseen: dict[str, dict[KeyframeId, Keyframe]] = {}
+        # Arrivals of keyframes whose first survey no surface has been built with yet; those of them that a survey has
+        # seen; and those whose first survey is in since the last evaluation.
+        self._unseen: dict[str, dict[KeyframeId, int]] = {}
+        self._compared: set[KeyframeId] = set()
         self._seen: list[tuple[KeyframeId, int]] = []
 
     def keyframe(self, robot: Robot, keyframe: Keyframe) -> None:
         """Use a robot's new keyframe. What is known of its pairs stands until it has a surface of its own."""
         robot.keyframe = keyframe
-        unseen = self._unseen.get(robot.id, {})
-        self._unseen[robot.id] = {
-            held: at for held, at in unseen.items() if self._agenda.under_way(at) or self._outlooks.building(at)
-        }
-        self._unseen[robot.id][keyframe.id] = keyframe
+        unseen = self._unseen.pop(robot.id, {})
+        kept = [name for name in unseen if self._agenda.under_way(name) or self._outlooks.building(name)]
+        self._compared.difference_update(unseen.keys() - set(kept))
+        self._unseen[robot.id] = {**{name: unseen[name] for name in kept}, keyframe.id: keyframe.arrived_ns}
         self._to_judge.setdefault(robot.id)
         earlier = self._outlooks.keyframe(keyframe)
         self._agenda.fresh(robot.id)
@@ -96,6 +97,11 @@ class Surveys:
         """How far a robot's reported pose is off, None while nothing is known of it."""
         return self._corrections[robot]
 
+    @property
+    def news(self) -> bool:
+        """Has the first survey of a keyframe come in since the last evaluation?"""
+        return bool(self._seen)
+
     def seen(self) -> tuple[tuple[KeyframeId, int], ...]:
         """Keyframes, with their arrival, whose first survey has come in since this was asked last."""
         seen, self._seen = tuple(self._seen), []
@@ -109,7 +115,7 @@ class Surveys:
         self._corrections.forget(robot)
         self._to_judge.pop(robot, None)
         self._reaches.pop(robot, None)
-        self._unseen.pop(robot, None)
+        self._compared.difference_update(self._unseen.pop(robot, {}))
 
     def _surveyed(self, event: SurveyDone, now_ns: int) -> list[Happened]:
         """Surfaces are built with what a survey found next."""
@@ -119,6 +125,9 @@ class Surveys:
             return []
         self._outlooks.surveyed(event.first, event.second, None if event.found is None else Evidence.of(event.found))
         if pair[0] != pair[1]:
+            self._compared.update(
+                name for name in (event.first, event.second) if name in self._unseen.get(name.robot, ())
+            )
             self._pairs.surveyed(*keyframes, event.found)
             self._look_over(pair, now_ns)
             self._agenda.again(pair)
@@ -135,7 +144,7 @@ class Surveys:
             robot, held = self._roster[keyframe.id.robot], before[keyframe.id.robot]
             outlook = self._outlooks[robot.id]
             if outlook is not None:
-                again = held is not None and held.keyframe is keyframe
+                again = held is not None and held.keyframe.id == keyframe.id
                 happened += self._corrections.note(outlook, now_ns, again=again)
                 self._deepen(robot, outlook)
                 self._read(outlook, now_ns)
@@ -169,16 +178,20 @@ class Surveys:
                 self._groups.see(pair, self._pairs.overlaps(pair))
 
     def _look_over(self, pair: Pair, now_ns: int) -> None:
-        """A survey that found nothing ends what was kept for another look alone."""
+        """A survey that verifies a pair makes it worth reading; one that does not ends what was kept for that alone."""
         robot = self._roster[pair[0]]
-        if robot.keyframe is not None and self._pairs[pair].outcome != Outcome.MEASURED:
+        if robot.keyframe is not None:
             self._judge(robot, robot.keyframe, now_ns, (pair[1],))
 
     def _worth_another_look(self, pair: Pair, keyframes: tuple[Keyframe, Keyframe]) -> bool:
-        """Was something seen in common before? If only to find that it is no more."""
+        """Do images say that there is something in common? They outrank what poses and depths say of views.
+
+        What was seen in common before is looked at again, if only to find that it is no more.
+        """
         record = self._pairs[pair]
-        looked = record.surveyed == (keyframes[0].id, keyframes[1].id)
-        return record.measured and not looked and sum(self._pairs.overlaps(pair) or ()) > 0
+        if record.surveyed == (keyframes[0].id, keyframes[1].id):
+            return record.outcome == Outcome.MEASURED
+        return record.measured and sum(self._pairs.overlaps(pair) or ()) > 0
 
     def _reach(self, robot: Robot, keyframe: Keyframe) -> prospects.Reach:
         held = self._reaches.get(robot.id)
@@ -197,9 +210,9 @@ class Surveys:
             self._groups.see(pair, self._pairs.overlaps(pair))
 
     def _note(self, keyframe: KeyframeId) -> None:
-        unseen = self._unseen.get(keyframe.robot, {}).pop(keyframe, None)
-        if unseen is not None:
-            self._seen.append((keyframe, unseen.arrived_ns))
+        if keyframe in self._compared:
+            self._compared.discard(keyframe)
+            self._seen.append((keyframe, self._unseen[keyframe.robot].pop(keyframe)))
 
     def _deepen(self, robot: Robot, outlook: Outlook) -> None:
         """Take the depth that a robot's surface tells; who may see what it sees is judged by it."""

@@ -164,6 +164,32 @@ def test_what_was_seen_in_common_is_looked_at_again_when_views_part() -> None:
     assert surveys(scene.settle()) == []
 
 
+def test_images_outrank_poses_that_say_that_views_cannot_meet() -> None:
+    scene = Scene.of(retry_after_s=0.0)
+    scene.send("r1", pose(0, AHEAD))
+    scene.send("r2", pose(1, AHEAD))
+    scene.settle()
+    scene.send("r3", pose(0, BACK))
+    scene.settle(lambda job: measured(0.4, 0.5))
+    for _ in range(20):
+        scene.settle(lambda job: measured(0.4, 0.5))
+    view = scene.snapshot.pair("r1", "r3")
+    assert (view.outcome, view.overlap_a, view.overlap_b) == ("measured", 0.4, 0.5)
+
+
+def test_a_keyframe_whose_surface_was_carried_over_has_not_been_surveyed() -> None:
+    scene = Scene.of(capacity=1)
+    scene.send("r1")
+    scene.send("r2")
+    scene.settle()
+    scene.send("r1")
+    (job,) = jobs(scene.tick())
+    scene.send("r1")
+    newest = scene.snapshot.robots["r1"].keyframe
+    told = evaluated([*scene.done(job, measured()), *scene.tick()])
+    assert newest not in [name for name, _ in told]
+
+
 def test_the_first_survey_of_a_keyframe_is_told_once_with_its_arrival() -> None:
     scene = Scene()
     for robot in ("r1", "r2", "r3"):

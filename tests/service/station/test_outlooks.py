@@ -5,6 +5,7 @@ import pytest
 from covista_service.perception.camera import Pose
 from covista_service.perception.surface import flat
 from covista_service.perception.visibility import SAME_SCALE
+from covista_service.station.events import KeyframeId
 from covista_service.station.outlooks import Agreements, Outlook, Scales
 
 from tests.service.station.scenes import Scene, pose
@@ -14,7 +15,7 @@ def agreements(agree: str = "", contradict: str = "") -> Agreements:
     found = Agreements()
     for pairs, said in ((agree, True), (contradict, False)):
         for one, other in pairs.split():
-            found.note(one, other, agree=said)
+            found.note(KeyframeId(one, "b", 0), KeyframeId(other, "b", 0), agree=said)
     return found
 
 
@@ -31,15 +32,21 @@ def agreements(agree: str = "", contradict: str = "") -> Agreements:
     ],
 )
 def test_the_largest_set_that_agrees_is_borne_out(agree: str, contradict: str, borne_out: str) -> None:
-    assert agreements(agree, contradict).borne_out() == set(borne_out)
+    assert agreements(agree, contradict).borne_out(lambda name: True) == set(borne_out)
 
 
 def test_what_was_said_last_counts_and_a_forgotten_robot_does_not() -> None:
     found = agreements("ab bc", "ad")
-    found.note("b", "c", agree=False)
-    assert found.borne_out() == {"a", "b"}
+    found.note(KeyframeId("b", "b", 1), KeyframeId("c", "b", 0), agree=False)
+    assert found.borne_out(lambda name: True) == {"a", "b"}
     found.forget("a")
-    assert found.borne_out() == set()
+    assert found.borne_out(lambda name: True) == set()
+
+
+def test_who_agreed_with_a_keyframe_that_is_gone_is_not_borne_out_by_that() -> None:
+    found = agreements("ab bc ad", "")
+    found.note(KeyframeId("b", "b", 0), KeyframeId("d", "b", 7), agree=False)
+    assert found.borne_out(lambda name: name != KeyframeId("d", "b", 0)) == {"a", "b", "c"}
 
 
 def outlooks(*centres_m: float) -> list[Outlook]:
