@@ -1,6 +1,6 @@
 import asyncio
 from collections.abc import Awaitable, Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 
 import pytest
@@ -10,7 +10,7 @@ from covista_schemas.reports import EventKind, FoundBy
 from covista_service.link.inbox import Inbox
 from covista_service.link.mailbox import Letter, Mailboxes
 from covista_service.loop import WORKER_FAILED, Loop, News
-from covista_service.station.events import Event, MessagesReceived, TokenSeen
+from covista_service.station.events import Event, MessagesReceived, SurveyPair, TokenSeen
 from covista_service.station.station import Station
 from covista_service.telemetry import Telemetry
 
@@ -105,6 +105,25 @@ def test_a_failed_extraction_drops_its_keyframe_alone(failure: Exception, code: 
     desk.put(picture_bytes("r1", sequence=1), "r1", 1)
     desk.settle()
     assert desk.loop.snapshot().robots["r1"].keyframes.used == 1
+
+
+def test_a_crew_that_cannot_take_a_job_gives_it_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing stays in flight for ever: with a crew that can, the next keyframes are surveyed."""
+
+    def refuse(job: SurveyPair) -> Future:
+        raise OSError("no more processes")
+
+    desk = Desk()
+    with monkeypatch.context() as broken:
+        broken.setattr(desk.hands, "survey", refuse)
+        for turn in range(4):
+            desk.put(keyframe_bytes("r1", 0.0, sequence=turn), "r1", turn)
+            desk.put(keyframe_bytes("r2", 1.0, sequence=turn), "r2", turn)
+            desk.settle()
+    assert desk.telemetry.summary().under_way == 0
+    desk.put(keyframe_bytes("r1", 0.0, sequence=4), "r1", 4)
+    desk.settle()
+    assert desk.loop.snapshot().pair("r1", "r2").found_by is FoundBy.IMAGE
 
 
 def test_a_failed_survey_is_counted_and_survived() -> None:

@@ -1,6 +1,15 @@
 import numpy as np
 import pytest
-from covista_service.perception.agreement import AGREED, CONTRADICTED, SINGLE, AgreementOptions, Observations, agree
+from covista_service.perception.agreement import (
+    AGREED,
+    CARRIED,
+    CONTRADICTED,
+    SINGLE,
+    AgreementOptions,
+    DepthPoints,
+    Observations,
+    agree,
+)
 
 OPTIONS = AgreementOptions()
 
@@ -54,3 +63,22 @@ def test_a_single_that_nothing_supports_is_dropped() -> None:
 def test_where_all_are_singles_none_is_dropped() -> None:
     points = agree([said(list(range(40)), [0.5] * 39 + [3.0])], PIXELS, 640, OPTIONS)
     assert len(points) == 40
+
+
+def test_a_keypoint_with_two_orientations_does_not_bear_itself_out() -> None:
+    agreed = list(range(30))
+    lone, twin = 35, 36
+    places = PIXELS.copy()
+    places[twin] = places[lone]
+    pairs = [said(agreed, [0.5] * 30), said(agreed, [0.5] * 30), said([lone, twin], [2.0, 2.0])]
+    points = agree(pairs, places, 640, OPTIONS)
+    assert tuple(places[lone].tolist()) not in {tuple(position) for position in points.positions_px.tolist()}
+
+
+def test_what_is_known_from_elsewhere_speaks_against_singles() -> None:
+    """Singles that are all there is stay, unless most of what is known around them says otherwise."""
+    few = said([0, 1, 2], [2.0, 2.0, 0.5])
+    known = DepthPoints(PIXELS[3:], np.full(37, 0.5), np.full(37, 1e-3), np.full(37, CARRIED))
+    assert len(agree([few], PIXELS, 640, OPTIONS)) == 3
+    points = agree([few], PIXELS, 640, OPTIONS, known)
+    assert points.inverse_depths.tolist() == [0.5]
