@@ -27,7 +27,7 @@ def log_to_stderr(level: str) -> None:
 class Summary:
     """What the station has measured of itself since it started.
 
-    `under_way` counts surveys and extractions at the workers; latencies run from a keyframe's arrival to the first
+    `under_way` counts surveys, surfaces and extractions at the workers; latencies run from a keyframe's arrival to the first
     groups evaluated with a survey of it.
     """
 
@@ -52,7 +52,9 @@ class Telemetry:
         self._surveys = PrometheusCounter(
             "covista_surveys", "Surveys by what they came to.", ["outcome"], registry=self.registry
         )
-        self._jobs = Gauge("covista_jobs_under_way", "Surveys and extractions at the workers.", registry=self.registry)
+        self._jobs = Gauge(
+            "covista_jobs_under_way", "Surveys, surfaces and extractions at the workers.", registry=self.registry
+        )
         self._latency = Histogram(
             "covista_keyframe_to_groups_seconds",
             "From a keyframe's arrival to the first groups evaluated with a survey of it.",
