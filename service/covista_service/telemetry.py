@@ -27,8 +27,8 @@ def log_to_stderr(level: str) -> None:
 class Summary:
     """What the station has measured of itself since it started.
 
-    `under_way` counts surveys, surfaces and extractions at the workers; latencies run from a keyframe's arrival to the first
-    groups evaluated with a survey of it.
+    `under_way` counts surveys, surfaces and extractions at the workers; latencies run from a keyframe's arrival to the
+    first groups evaluated with a survey of it.
     """
 
     surveys: int

@@ -62,7 +62,8 @@ def _common_field(view: PairView, *, first: bool) -> CommonField | None:
     regions = tuple(answers.common_regions(view)[0 if first else 1])
     survey = answers.explaining_survey(view)
     if survey is None:
-        return CommonField(regions) if view.outlooks is not None else None
+        # Views that cannot meet have nothing in common, and that is known.
+        return None if view.overlap_a is None else CommonField(regions)
     return CommonField(
         regions,
         tuple(plane.region_first if first else plane.region_second for plane in survey.planes),

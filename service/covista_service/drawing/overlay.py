@@ -133,8 +133,10 @@ def _draw(ground: Picture, common: CommonField, scale: float) -> Picture:
             canvas.fill(tinted, polygon_px, canvas.palette(index), 0.22)
             canvas.line(tinted, polygon_px, canvas.palette(index), 2, closed=True)
     drawn = np.rint(tinted * seen + drawn * (1.0 - seen)).astype(np.uint8)
-    for region_px in regions_px:
-        canvas.line(drawn, region_px, canvas.PAPER, 1, closed=True)
+    if regions_px:
+        # The border of what is seen: a region's own line runs along seams to its holes too.
+        outlines, _ = cv2.findContours((seen[..., 0] > 0.5).astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+        cv2.drawContours(drawn, outlines, -1, canvas.PAPER, 1)
     for point_px, plane in zip(_scaled(common.points_px, scale), common.plane_of_point, strict=True):
         canvas.dot(drawn, point_px, 2.0, canvas.YELLOW if plane >= 0 else canvas.GREY)
     return drawn

@@ -109,7 +109,7 @@ def bars(groups: Sequence[str], series: Mapping[str, Sequence[float | None]], ti
         axes.set_ylabel(y_label)
         axes.set_title(title)
         if len(series) > 1:
-            figure.legend(loc="outside lower center", ncols=min(len(series), 6))
+            figure.legend(loc="outside lower center", ncols=min(len(series), 4))
         return _png(figure)
 
 

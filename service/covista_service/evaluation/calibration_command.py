@@ -37,18 +37,23 @@ def calibrate(
 
     from covista_service.evaluation.calibration import fit, left_out
     from covista_service.evaluation.command import parse_noise
-    from covista_service.evaluation.files import DatasetError
+    from covista_service.evaluation.files import DatasetError, make_folder
     from covista_service.evaluation.run import RunOptions
 
     options = RunOptions(input=input, noise=parse_noise(pose_noise), seeds=seeds)
     try:
+        if figures is not None:
+            make_folder(figures)
         trials = _trials(folders, options, Console(stderr=True))
     except DatasetError as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(1) from error
-    if len(set(trials.kinds.tolist())) < 2:
+    kinds = len(set(trials.kinds.tolist()))
+    if kinds < 2:
         typer.echo(
-            "Two kinds of sets with cameras or more: each is judged by constants fitted to the others.", err=True
+            f"Sets with cameras, of two kinds or more, are needed, and these are of {kinds}: each kind is judged by "
+            "constants fitted to the others. Sets whose names differ in a number at the end alone are of one kind.",
+            err=True,
         )
         raise typer.Exit(1)
     out = Console(width=None if Console().is_terminal else _WIDTH)
@@ -125,5 +130,4 @@ def _draw(trials: Trials, judged: Floats, folder: Path) -> None:
     curves = {title: held[:, half].mean(axis=1) for title, half in halves.items() if half.any()}
     may_meet = ~trials.matched & trials.doubtful
     groups = {"matched": widths[trials.matched], "predicted, may meet": widths[may_meet]}
-    folder.mkdir(parents=True, exist_ok=True)
     (folder / "calibration.png").write_bytes(calibration_plot(_LEVELS, curves, groups))

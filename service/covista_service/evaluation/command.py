@@ -64,6 +64,7 @@ def evaluate(
     from covista_schemas.messages import FeatureKind
     from rich.console import Console
 
+    from covista_service.evaluation.files import make_folder
     from covista_service.evaluation.run import RunOptions
 
     options = RunOptions(
@@ -75,6 +76,8 @@ def evaluate(
     )
     console = Console(stderr=True)
     try:
+        if figures is not None:
+            make_folder(figures)
         evaluations = _run(folders, options, figures, console)
     except CovistaError as error:
         typer.echo(str(error), err=True)

@@ -12,6 +12,7 @@ from covista_service.drawing import plots
 from covista_service.evaluation import pictures
 from covista_service.evaluation.case import Case, Pair
 from covista_service.evaluation.datasets import Dataset
+from covista_service.evaluation.files import make_folder
 from covista_service.evaluation.run import Evaluation
 from covista_service.perception.camera import Floats
 from covista_service.perception.survey import Outcome
@@ -23,14 +24,14 @@ _ERROR = "|answered - true share|"
 
 def write_set(folder: Path, dataset: Dataset, evaluations: Sequence[Evaluation]) -> None:
     """Plots of all `evaluations` of a set, and its overlays: SET_scatter.png, SET_errors.png, SET_overlay_A_B.png."""
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     answers = _answers(dataset, evaluations)
     name = _file_name(dataset.name)
     if any(len(truth) for truth, _ in answers.values()):
         panels = [_panel(method, *found) for method, found in answers.items()]
         _write(folder / f"{name}_scatter.png", plots.scatters(panels, dataset.name, _TRUTH, _ANSWER))
         errors = {method: np.abs(given - truth) for method, (truth, given) in answers.items()}
-        title = f"{dataset.name}: error over ordered pairs"
+        title = f"{dataset.name}\nerror over ordered pairs"
         _write(folder / f"{name}_errors.png", plots.boxes(errors, title, _ERROR))
     for (a, b), picture in _overlays(dataset, evaluations[0].case).items():
         ids = (_file_name(dataset.frames[k].id) for k in (a, b))
@@ -45,7 +46,7 @@ def write_overview(folder: Path, evaluations: Sequence[Evaluation]) -> None:
     if len(sets) > 1:
         means = {method: [*row, _mean(row)] for method, row in means.items()}
         sets.append("mean")
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     title = "Mean error of the overlap (no answer counts as 0)"
     _write(folder / "errors.png", plots.bars(sets, means, title, f"mean of {_ERROR}"))
 

@@ -32,6 +32,14 @@ class DatasetError(CovistaError, ValueError):
         self.reason = reason
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder to write into, before what is to be written is computed. Raises DatasetError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise DatasetError(folder, "", f"cannot be made a folder: {error.strerror}") from error
+
+
 class FrameFile(BaseModel):
     """One image of a set; `T_wc` is camera-to-world, `H_1_to_this` maps pixels of the first image to this one's."""
 

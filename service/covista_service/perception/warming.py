@@ -21,8 +21,8 @@ _OFF_RAD = 0.07
 def warm_up() -> None:
     """Compile what no earlier process has left in numba's cache, and load the rest; once per process.
 
-    Three views of a slanted wall go through all stages. One reports a wrong pose, or nobody would adjust poses. ORB takes
-    the same ways as RootSIFT.
+    Three views of a slanted wall go through all stages. One reports a wrong pose, or nobody would adjust poses. ORB
+    takes the same ways as RootSIFT.
     """
     views = _views()
     pairs = [(0, 1), (0, 2), (1, 2)]

@@ -43,6 +43,20 @@ def test_what_the_other_does_not_see_is_dimmed() -> None:
     assert seen > 150
 
 
+def test_nothing_in_common_is_dimmed_all_over() -> None:
+    found = drawn(overlay(keyframe(image=IMAGE), CommonField(), "nothing"))
+    assert found[10:470, 10:630].mean() == pytest.approx(0.35 * 200, abs=3)
+
+
+def test_seams_to_holes_are_not_drawn() -> None:
+    """A region's line runs along a seam to its hole and back: no border of what is seen."""
+    ring = np.array([[-0.5, -0.5], [319.5, -0.5], [319.5, 239.5], [-0.5, 239.5], [-0.5, 99.5]])
+    hole = np.array([[99.5, 99.5], [99.5, 139.5], [139.5, 139.5], [139.5, 99.5], [99.5, 99.5], [-0.5, 99.5]])
+    found = drawn(overlay(keyframe(image=IMAGE), CommonField((np.vstack((ring, hole)),)), "hole"))
+    along_the_seam = found[195:206, 20:180]
+    assert along_the_seam.max() < 240
+
+
 def test_planes_have_colours_of_their_own() -> None:
     right_half = LEFT_HALF + np.array([160, 0])
     found = drawn(overlay(keyframe(image=IMAGE), CommonField(polygons_px=(LEFT_HALF, right_half)), "two"))

@@ -100,4 +100,4 @@ def test_the_command_fits_and_draws(tmp_path: Path) -> None:
 def test_one_kind_of_set_cannot_be_left_out(tmp_path: Path) -> None:
     result = CliRunner().invoke(APP, [str(recording.write(tmp_path / "plane"))])
     assert result.exit_code == 1
-    assert "Two kinds" in result.stderr
+    assert "of two kinds or more, are needed, and these are of 1" in result.stderr

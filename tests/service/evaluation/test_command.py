@@ -97,3 +97,11 @@ def test_a_table_is_for_people(tmp_path: Path) -> None:
     assert result.exit_code == 0
     assert "plane" in result.stdout
     assert "found" in result.stdout
+
+
+def test_pictures_are_not_written_into_a_file(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("mine")
+    result = CliRunner().invoke(APP, [str(tmp_path / "none"), "--figures", str(tmp_path / "file")])
+    assert result.exit_code == 1
+    assert "cannot be made a folder" in result.stderr
+    assert (tmp_path / "file").read_text() == "mine"

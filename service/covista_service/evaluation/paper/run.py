@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
+from covista_service.evaluation.files import make_folder
 from covista_service.evaluation.paper.chapter import Experiment, Item, Tell
 from covista_service.evaluation.paper.common_field import common_field
 from covista_service.evaluation.paper.correlation import correlation
@@ -20,7 +21,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
 
 def run(out: Path, experiments: Mapping[str, Experiment], tell: Tell) -> list[Item]:
     """All items; pictures are written as they come, and paper.json at the end. `tell` hears what is going on."""
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     items: list[Item] = []
     for experiment in experiments.values():
         chapter = experiment(tell)
