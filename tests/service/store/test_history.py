@@ -6,8 +6,6 @@ import pytest
 from covista_schemas.reports import EventReport, GroupsReport
 from covista_service.answers import groups_report
 from covista_service.loop import News
-from covista_service.station.options import StationOptions
-from covista_service.station.station import Station
 from covista_service.store.database import DatabaseError, check_url
 from covista_service.store.history import History
 
@@ -63,7 +61,7 @@ def test_numbering_goes_on_after_a_restart(file: Path) -> None:
     again = History(url(file))
     assert again.last.event == news.events[-1].id
     assert again.last.revision == news.snapshot.groups.revision > 0
-    scene = Scene(Station(StationOptions(revision=again.last.revision)))
+    scene = Scene.of(revision=again.last.revision)
     scene.send("r1")
     later = news_of(scene)
     again.take(later)
