@@ -20,6 +20,8 @@ CLUES = 5
 _APART, _BEFORE, _HIDDEN, _INNER, _OUTER = 0, 1, 2, 3, 4
 # Further apart than this share of its inverse depth, a surface is simply another one.
 _FARTHEST_APART = 0.5
+# The slope of a surface is taken over so many cells to either side.
+_STEP = 2
 
 
 @compiled
@@ -61,7 +63,8 @@ def look(
 ) -> NDArray[np.int64]:
     """Number of cells seen of each pair; masks are written to `masks`, over and over if there are fewer of them.
 
-    `limits`: tolerance, squared parallax in px, tolerance between unconnected keyframes, and the edge in image widths.
+    `limits`: tolerance, squared parallax in px, tolerance between unconnected keyframes, the edge in image widths, and
+    how far a camera is clearly beyond a surface.
     `clues` (n, CLUES) is filled, unless it is empty.
     """
     counts = np.empty(len(pairs), np.int64)
@@ -216,6 +219,9 @@ def _seen(
             there = _sampled(other_rho, u, v) * w * ratio
             trusted = room + other_sigma[int(v), int(u)] if connected else room
             hidden = here < there * (1 - trusted)
+            if not hidden and _beyond(rho, r, c, epipole, limits[4]):
+                mask[r, c] = False
+                continue
             if hidden and connected:
                 nearer = there - here
                 along = (epipole[0] - (c + 0.5) * ahead) * cell_px[0]
@@ -228,6 +234,22 @@ def _seen(
     if weigh:
         clues /= ROWS * COLUMNS
     return count
+
+
+@compiled
+def _beyond(rho: Floats, r: int, c: int, epipole: tuple[float, float, float], clearly: float) -> bool:
+    """Does the other camera look at a cell from behind: is it clearly beyond the plane that the surface has there?
+
+    Inverse depth is affine on a plane: rho = a (c + .5) + b (r + .5) + d, and 1 - (a, b, d) . X, with X in cells times
+    depth, is positive on the side of the first camera (section 3 of the method: 1 + u . C2).
+    """
+    left, right = max(c - _STEP, 0), min(c + _STEP, COLUMNS - 1)
+    upper, lower = max(r - _STEP, 0), min(r + _STEP, ROWS - 1)
+    across = (rho[r, right] - rho[r, left]) / (right - left)
+    down = (rho[lower, c] - rho[upper, c]) / (lower - upper)
+    x, y, w = epipole
+    side = 1 - across * (x - (c + 0.5) * w) - down * (y - (r + 0.5) * w) - rho[r, c] * w
+    return bool(side < -clearly)
 
 
 @compiled

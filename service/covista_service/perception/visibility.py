@@ -29,7 +29,8 @@ class VisibilityOptions:
     And by more than `parallax_px` in the image, or tiny baselines would turn noise into occlusions. Between keyframes
     that no chain of matches connects, depths have scales of their own: there the median ratio is taken out, as far as
     `scale_sigmas` of those scales allow, and `unconnected_tolerance` holds. Up to `edge` image widths from its border
-    is near to it.
+    is near to it. Nothing is seen from behind: from `beyond` times as far behind a surface as the first camera stands
+    before it, for the slope of a surface is not exact.
     """
 
     tolerance: float = 0.05
@@ -37,6 +38,7 @@ class VisibilityOptions:
     unconnected_tolerance: float = 0.25
     scale_sigmas: float = 3.0
     edge: float = 0.05
+    beyond: float = 0.8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -168,7 +170,9 @@ def _look(
         gallery.inverse_depth,
         gallery.sigma,
         gallery.range_of_row,
-        np.array([options.tolerance, options.parallax_px**2, options.unconnected_tolerance, options.edge]),
+        np.array(
+            [options.tolerance, options.parallax_px**2, options.unconnected_tolerance, options.edge, options.beyond]
+        ),
         seen,
         clues,
     )

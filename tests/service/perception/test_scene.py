@@ -123,3 +123,29 @@ def test_cameras_of_other_sizes_agree() -> None:
     large, small = views(FACING, POSES), views(FACING, POSES, camera=half)
     mixed = reconstruct([large[0], small[1]], [(0, 1)], OPTIONS).overlap(0, 1)
     assert mixed == pytest.approx(reconstruct(large[:2], [(0, 1)], OPTIONS).overlap(0, 1), abs=0.03)
+
+
+def test_swapping_two_keyframes_swaps_their_shares() -> None:
+    one, other = views(points_on_wall(), POSES[:2], noise_px=0.3)
+    forth = reconstruct([one, other], [(0, 1)], OPTIONS).overlap(0, 1)
+    back = reconstruct([other, one], [(0, 1)], OPTIONS).overlap(0, 1)
+    assert forth is not None
+    assert back is not None
+    assert forth == pytest.approx(back[::-1], abs=2e-3)
+
+
+def test_opposite_sides_of_a_wall_have_nothing_in_common() -> None:
+    """Two cameras on either side: whatever their images match, nobody sees the side that another looks at."""
+    wall = points_on_wall(900, slope=0.0)
+    beyond = [Pose(turn(0, np.pi, 0), np.array([x, 0, 12.0])) for x in (0.0, -1.0)]
+    front = views(wall, [Pose(np.eye(3), np.array([x, 0, 0])) for x in (0.0, 1.0)], noise_px=0.3)
+    back = [
+        View(view.camera, view.pose, Features("rootsift", view.features.keypoints_px, 255 - view.features.descriptors))
+        for view in views(wall, beyond, noise_px=0.3)
+    ]
+    scene = reconstruct([*front, *back], ALL, OPTIONS)
+    assert scene.matched[0, 2] == 0
+    seen = scene.overlap(0, 1)
+    assert seen is not None
+    assert min(seen) > 0.7
+    assert scene.overlap(0, 2) == pytest.approx((0, 0), abs=0.03)

@@ -152,7 +152,21 @@ def by_the_book(
     elif len(here):
         ratio = np.clip(np.median(here / there), *ratios)
         seen[seen] = here >= there * ratio * (1 - OPTIONS.unconnected_tolerance)
-    return seen.reshape(ROWS, COLUMNS)
+    return seen.reshape(ROWS, COLUMNS) & (sides(first, -rotation.T @ translation) >= -OPTIONS.beyond)
+
+
+def sides(first: Seeing, centre: Floats) -> Floats:
+    """1 + u . C2 of the plane u . X + 1 = 0 that the surface has at each cell: negative beyond it."""
+    rho, camera = first.surface.inverse_depth, first.camera
+    columns, rows = np.arange(COLUMNS), np.arange(ROWS)
+    left, right = np.maximum(columns - 2, 0), np.minimum(columns + 2, COLUMNS - 1)
+    upper, lower = np.maximum(rows - 2, 0), np.minimum(rows + 2, ROWS - 1)
+    by_x = (rho[:, right] - rho[:, left]) / (right - left) * COLUMNS / camera.width
+    by_y = (rho[lower] - rho[upper]) / (lower - upper)[:, None] * ROWS / camera.height
+    x, y = (axis.reshape(ROWS, COLUMNS) for axis in cell_centres(camera).T)
+    # rho = (by_x, by_y, d) . v = -u . K^-1 v
+    u = -np.stack((by_x, by_y, rho - by_x * x - by_y * y), axis=-1) @ camera.matrix
+    return 1 + u @ centre
 
 
 @pytest.mark.parametrize("seed", range(3))
