@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from collections.abc import Set as AbstractSet
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,6 +16,7 @@ from covista_service.perception.scene import Evidence, Settled, Sight
 from covista_service.perception.surface import Surface
 from covista_service.perception.visibility import SAME_SCALE, Mask, Seeing, VisibilityOptions, seen
 from covista_service.perception.warp import Carried
+from covista_service.station.agreements import Agreements
 from covista_service.station.events import BuildSurfaces, Keyframe, KeyframeId, SurfacesBuilt
 
 # Depths that keyframes replaced since have given to one that is still in use.
@@ -317,39 +317,6 @@ def view_of(keyframe: Keyframe, pose: Pose) -> View:
     if keyframe.features is None:
         raise ValueError(f"{keyframe.id} has no features yet")
     return View(keyframe.camera, pose, keyframe.features)
-
-
-class Agreements:
-    """Which robots' reported poses the images of which others bear out."""
-
-    def __init__(self) -> None:
-        self._agree: dict[tuple[str, str], tuple[Names, bool]] = {}
-
-    def note(self, first: KeyframeId, second: KeyframeId, *, agree: bool) -> None:
-        """Enter whether the images of two robots agree with what the two have reported."""
-        self._agree[first.robot, second.robot] = ((first, second), agree)
-
-    def borne_out(self, held: Callable[[KeyframeId], bool]) -> AbstractSet[str]:
-        """The largest set of robots that are connected by agreement: who contradicts them is taken to be wrong.
-
-        Nobody where no set is larger than all others. Only keyframes that are still `held` bear witness: a robot that
-        was right long ago may have lost its way.
-        """
-        said = {pair: agree for pair, (names, agree) in self._agree.items() if all(map(held, names))}
-        names = sorted({name for pair in said for name in pair})
-        index = {name: k for k, name in enumerate(names)}
-        parts = parts_of(len(names), [(index[a], index[b]) for (a, b), agree in said.items() if agree])
-        if not len(parts):
-            return frozenset()
-        sizes = np.bincount(parts)
-        largest = int(sizes.argmax())
-        if (sizes == sizes[largest]).sum() > 1:
-            return frozenset()
-        return frozenset(name for name, part in zip(names, parts.tolist(), strict=True) if part == largest)
-
-    def forget(self, robot: str) -> None:
-        """Drop a robot."""
-        self._agree = {pair: said for pair, said in self._agree.items() if robot not in pair}
 
 
 class Scales:

@@ -5,8 +5,9 @@ import pytest
 from covista_service.perception.camera import Pose
 from covista_service.perception.surface import flat
 from covista_service.perception.visibility import SAME_SCALE
+from covista_service.station.agreements import Agreements
 from covista_service.station.events import KeyframeId
-from covista_service.station.outlooks import Agreements, Outlook, Scales
+from covista_service.station.outlooks import Outlook, Scales
 
 from tests.service.station.scenes import Scene, pose
 
