@@ -65,7 +65,7 @@ class Curve:
 def need_matplotlib() -> None:
     """Raise MissingExtraError where matplotlib is not installed, before anything is computed for it."""
     try:
-        import matplotlib  # noqa: F401
+        import matplotlib  # noqa: F401 - to see whether it is there
     except ImportError as error:
         raise MissingExtraError("drawing plots", "bench") from error
 
