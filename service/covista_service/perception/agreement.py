@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from covista_service.compiled import compiled
 from covista_service.perception.camera import Floats
-from covista_service.perception.compiled import compiled
 from covista_service.perception.nearest import nearest
 
 Mask = NDArray[np.bool_]

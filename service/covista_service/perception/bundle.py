@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from covista_service.compiled import compiled
 from covista_service.perception.camera import Floats
-from covista_service.perception.compiled import compiled
 
 _AHEAD = 1e-9
 # A point behind a camera costs as much as one that is this far off, in px squared.

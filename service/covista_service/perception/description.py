@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from covista_service.compiled import compiled
 from covista_service.perception.camera import Floats
-from covista_service.perception.compiled import compiled
 from covista_service.perception.fuzzy import fit
 
 Labels = NDArray[np.int64]

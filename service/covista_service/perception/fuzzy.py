@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from covista_service.compiled import compiled
 from covista_service.perception.camera import Floats
-from covista_service.perception.compiled import compiled
 from covista_service.perception.seeding import initial_cells, robust_planes
 
 _TINY = 1e-12

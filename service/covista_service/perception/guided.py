@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from covista_service.compiled import compiled
 from covista_service.perception.camera import Features, Floats
-from covista_service.perception.compiled import compiled
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from covista_service.compiled import compiled
 from covista_service.perception.camera import Floats
-from covista_service.perception.compiled import compiled
 
 Indices = NDArray[np.int64]
 # Points of a bucket, on average.

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from covista_service.compiled import compiled
 from covista_service.perception.camera import Camera, Floats
-from covista_service.perception.compiled import compiled
 from covista_service.perception.overlap import EDGE_ON
 
 Slices = NDArray[np.int64]

@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from covista_service.compiled import compiled
 from covista_service.perception.camera import Camera, Floats
-from covista_service.perception.compiled import compiled
 from covista_service.perception.polygon import Polygon
 
 Mask = NDArray[np.bool_]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from covista_service.perception.compiled import compiled
+from covista_service.compiled import compiled
 
 Singles = NDArray[np.float32]
 _NEVER = np.float32(1e9)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from covista_service.compiled import compiled
 from covista_service.perception.agreement import DepthPoints
 from covista_service.perception.camera import Camera, Floats
-from covista_service.perception.compiled import compiled
 from covista_service.perception.nearest import nearest
 
 COLUMNS, ROWS = 48, 36

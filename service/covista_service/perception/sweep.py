@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from covista_service.compiled import compiled
 from covista_service.perception.camera import Camera, Floats
-from covista_service.perception.compiled import compiled
 
 Singles = NDArray[np.float32]
 # Of a glimpse that a window fits into.

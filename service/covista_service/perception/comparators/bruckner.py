@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from covista_service.compiled import compiled
 from covista_service.perception.camera import Features, Floats
 from covista_service.perception.comparators.consensus import ConsensusOptions, consensus
 from covista_service.perception.comparators.image import Image
-from covista_service.perception.compiled import compiled
 from covista_service.perception.matching import MatchingOptions, distances, match
 
 # Descriptors are bytes, so that none but equal ones are nearer to each other.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from covista_service.compiled import compiled
 from covista_service.perception.camera import Floats
-from covista_service.perception.compiled import compiled
 from covista_service.perception.description import OUTLIER, Labels, Terms, costs, length, refitted
 from covista_service.perception.fuzzy import Points
 from covista_service.perception.planes import FoundPlanes, PlaneOptions, by_support, neighbours, terms_of
