@@ -218,6 +218,25 @@ class GroupBounds(Report):
         return self
 
 
+class Hysteresis(Report):
+    """When groups on show change, and how overlaps are smoothed: so that what flickers does not make groups flicker."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    gain: float = Field(
+        default=0.05,
+        ge=0,
+        le=10,
+        description="A change is shown at once if it gains more than this share of the score of the groups it changes.",
+    )
+    persistence_s: float = Field(
+        default=5.0, ge=0, le=3600, description="A change that gains less is shown when it has lasted so long, s."
+    )
+    smoothing: float = Field(
+        default=0.3, gt=0, le=1, description="Weight of a pair's newest overlap in the similarity; 1: no smoothing."
+    )
+
+
 class LiveSettings(Report):
     """The settings that can change while the station runs."""
 
@@ -227,12 +246,22 @@ class LiveSettings(Report):
     groups: Literal["auto"] | Annotated[int, Field(ge=1)] | GroupBounds = Field(
         default="auto", description="auto, a number of groups, or bounds on it."
     )
-    sigma: Literal["std"] | Annotated[float, Field(gt=0, allow_inf_nan=False)] = Field(
-        default="std", description="Range of Eq. 15: std (standard deviation of all distances), or metres."
+    min_group_size: int = Field(default=1, ge=1, description="How many robots a group has at least.")
+    sigma: Literal["shared", "std"] | Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False)] = Field(
+        default="shared",
+        description="Range of Eq. 15: shared (by the distances of robots that see the same), "
+        "std (standard deviation of all distances, as in the paper), or metres.",
     )
-    criterion: Literal["fiedler", "paper"] = Field(
-        default="fiedler", description="How the number of groups is chosen: Eq. 17, with M = 1 or as printed."
+    criterion: Literal["adaptive", "silhouette", "gain", "fiedler", "paper", "eigengap", "modularity"] = Field(
+        default="adaptive",
+        description="How the number of groups is chosen; paper is Eq. 17 as printed, for 30 robots at most.",
     )
+    grouping: Literal["spectral", "components", "distance"] = Field(
+        default="spectral",
+        description="What groups are made from: spectral (the similarity), components (robots linked by similarities "
+        "above a threshold), distance (closeness alone).",
+    )
+    hysteresis: Hysteresis = Hysteresis()
 
 
 class GroupsReport(Report):
@@ -243,7 +272,10 @@ class GroupsReport(Report):
     groups: list[Group]
     ungrouped: list[Ungrouped]
     criterion: str
-    scores: list[Score]
+    scores: list[Score] = Field(description="Of every number of groups that was looked at, by the criterion.")
+    note: str | None = Field(
+        default=None, description="Settings that so many robots cannot keep, or that are not meant for as many."
+    )
     settings: LiveSettings
 
 

@@ -14,6 +14,7 @@ from covista_service.access import check_listening
 from covista_service.api import rest
 from covista_service.api.deps import Parts, State
 from covista_service.config import Settings
+from covista_service.grouping.hysteresis import HysteresisOptions
 from covista_service.link.inbox import Inbox
 from covista_service.link.ingest import Ingest
 from covista_service.link.mailbox import Mailboxes
@@ -132,4 +133,13 @@ def _station_options(settings: Settings, capacity: int, revision: int) -> Statio
 def _grouping_options(live: LiveSettings) -> GroupingOptions:
     groups = live.groups
     bounds = (groups.min, groups.max) if isinstance(groups, GroupBounds) else groups
-    return GroupingOptions(live.alpha, bounds, live.sigma, live.criterion)
+    return GroupingOptions(
+        live.alpha,
+        bounds,
+        live.min_group_size,
+        live.sigma,
+        live.criterion,
+        live.grouping,
+        HysteresisOptions(live.hysteresis.gain, live.hysteresis.persistence_s),
+        live.hysteresis.smoothing,
+    )

@@ -34,8 +34,9 @@ def groups_report(snapshot: Snapshot) -> reports.GroupsReport:
         time=reports.time_of(view.time_ns or snapshot.now_ns),
         groups=[reports.Group(label=group.label, robots=list(group.robots)) for group in view.groups],
         ungrouped=[reports.Ungrouped(robot=robot, reason=reason) for robot, reason in view.ungrouped],
-        criterion=view.settings.criterion,
+        criterion="components" if view.settings.grouping == "components" else view.settings.criterion,
         scores=[reports.Score(groups=groups, score=score) for groups, score in view.scores],
+        note=view.note,
         settings=_live_settings(view.settings),
     )
 
@@ -79,6 +80,13 @@ def _live_settings(options: GroupingOptions) -> reports.LiveSettings:
     return reports.LiveSettings(
         alpha=options.alpha,
         groups=reports.GroupBounds(min=groups[0], max=groups[1]) if isinstance(groups, tuple) else groups,
+        min_group_size=options.min_group_size,
         sigma=options.sigma,
         criterion=options.criterion,
+        grouping=options.grouping,
+        hysteresis=reports.Hysteresis(
+            gain=options.hysteresis.gain,
+            persistence_s=options.hysteresis.persistence_s,
+            smoothing=options.smoothing,
+        ),
     )

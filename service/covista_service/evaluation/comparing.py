@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from covista_service.evaluation.case import NO_CAMERA, NO_DEPTH, Answer, Case, Pair, TimedSurvey, connected
-from covista_service.grouping.similarity import closeness
+from covista_service.grouping.similarity import closeness, standard_sigma_m
 from covista_service.perception.camera import Floats, View, relative, undistort
 from covista_service.perception.comparators import bruckner, coslam, hull, snavely
 from covista_service.perception.comparators.image import Image, image_of
@@ -65,7 +65,8 @@ def distances(case: Case) -> dict[Pair, Answer]:
     for group in connected(case.pairs):
         members = sorted(group)
         centres = np.array([case.views[index].pose.centre_m for index in members])
-        matrix = closeness(np.linalg.norm(centres[:, None] - centres, axis=2), "std")
+        distance_m = np.linalg.norm(centres[:, None] - centres, axis=2)
+        matrix = closeness(distance_m, standard_sigma_m(distance_m))
         near.update({(a, b): float(matrix[i, j]) for i, a in enumerate(members) for j, b in enumerate(members)})
     ms = _ms(start) / max(len(case.pairs), 1)
     return {pair: Answer("predicted", "predicted", near[pair], near[pair], ms=ms) for pair in case.pairs}

@@ -7,45 +7,171 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from covista_service.compiled import compiled
+
 Floats = NDArray[np.float64]
-Sigma = Literal["std"] | float
-# Distances that differ by less than this share of their mean differ by rounding alone.
-_EQUAL = 1e-9
+Sigma = Literal["shared", "std"] | float
+# Distances that differ by less than this share of their mean count as equal: below it the difference of the mean
+# square and the squared mean is rounding.
+EQUAL = 1e-6
+# Who sees more than this in common with somebody tells how far apart robots of one group stand.
+_SHARED = 0.25
+_PARTNERS = 2
+_REACH = 3.0
 
 
-def sigma_m(distance_m: Floats, sigma: Sigma) -> float:
-    """The range of Eq. 15 in metres: as given, or the standard deviation of the N(N - 1)/2 distances (N, N).
+def sigma_m(distance_m: Floats, mutual: Floats, sigma: Sigma) -> float:
+    """The range of Eq. 15 in metres, from distances and mutual overlaps (N, N; NaN unknown).
 
-    Their mean where all are equal (two robots, an equilateral triangle), and 1 where all are 0. Computed afresh from
-    the matrix: a running sum of squares loses the spread of a tight swarm that has been far apart before.
+    A number is taken as given. `std`, as printed, is the standard deviation of the N(N - 1)/2 distances: their mean
+    where all are equal (two robots, an equilateral triangle). It is the size of the arena, so in a large swarm
+    everybody is close to everybody. `shared` is 3 times the median distance from a robot to the two that it has most
+    in common with, of those who share more than a quarter. Where there are fewer than N/2 such partners, it is the
+    median distance to the nearest robot, halved where the two are known to share less. 1 where all distances are 0.
     """
-    if sigma != "std":
-        return sigma
-    count = len(distance_m)
+    if sigma == "shared":
+        return shared_sigma_m(np.square(distance_m), mutual)
+    return standard_sigma_m(distance_m) if sigma == "std" else sigma
+
+
+def standard_sigma_m(distance_m: Floats) -> float:
+    """The range of Eq. 15 as printed, by the standard deviation of distances (N, N): see `sigma_m`."""
+    above = distance_m[np.triu_indices(len(distance_m), 1)]
+    return spread_m(len(above), float(above.sum()), float(above @ above))
+
+
+def spread_m(count: int, total_m: float, squares_m2: float) -> float:
+    """The standard deviation of `count` distances from their sum and the sum of their squares, as Eq. 15 wants it.
+
+    The difference loses digits only where the spread is small beside the mean; in three dimensions no more than four
+    robots can be so, and then Eq. 15 is 0 to all digits.
+    """
+    if not count or total_m == 0:
+        return 1.0
+    mean = total_m / count
+    variance = squares_m2 / count - mean * mean
+    return float(np.sqrt(variance)) if variance > (EQUAL * mean) ** 2 else mean
+
+
+def shared_sigma_m(squared_m2: Floats, mutual: Floats) -> float:
+    """The range of Eq. 15 by those who see the same, from squared distances (N, N): see `sigma_m`."""
+    count = len(squared_m2)
     if count < 2:
         return 1.0
-    mean = float(distance_m.sum()) / (count * (count - 1))
-    if mean == 0:
-        return 1.0
-    deviation = distance_m - mean
-    np.fill_diagonal(deviation, 0.0)
-    spread = float(np.sqrt(np.vdot(deviation, deviation) / (count * (count - 1))))
-    return spread if spread > _EQUAL * mean else mean
+    partners_m, nearest_m = _companions(squared_m2, mutual)
+    sigma = _REACH * float(np.median(partners_m)) if 2 * len(partners_m) >= count else float(np.median(nearest_m))
+    if sigma == 0:
+        # Most stand in one place.
+        sigma = float(np.sqrt(squared_m2).mean())
+    return sigma or 1.0
 
 
-def closeness(distance_m: Floats, sigma: Sigma) -> Floats:
+def closeness(distance_m: Floats, sigma_m: float) -> Floats:
     """d_ij = exp(-|r_i - r_j|^2 / sigma^2), Eq. 15, for distances (N, N)."""
-    result: Floats = np.exp(-np.square(distance_m / sigma_m(distance_m, sigma)))
+    result: Floats = np.exp(-np.square(distance_m / sigma_m))
     return result
 
 
-def similarity(overlap: Floats, near: Floats, alpha: float) -> Floats:
+def mutual_overlap(overlap: Floats) -> Floats:
+    """(q_ij + q_ji)/2 for overlaps (N, N); NaN where one of the two is unknown."""
+    result: Floats = (overlap + overlap.T) / 2
+    return result
+
+
+def similarity(mutual: Floats, squared_m2: Floats, alpha: float, sigma_m: float) -> Floats:
     """s_ij = alpha (q_ij + q_ji)/2 + (1 - alpha) d_ij, Eq. 16, with s_ii = 1.
 
-    Where the overlap is unknown (NaN) distance alone speaks: taken for 0 it would part robots that nobody has
-    compared yet.
+    From mutual overlaps (N, N) and squared distances (N, N), m^2. An unknown overlap (NaN) is not zero overlap: it is
+    what the best chain over one other robot passes on, max over k of the product of the mutual overlaps. Where nobody
+    is such a link, distance alone speaks.
     """
-    mutual = (overlap + overlap.T) / 2
-    result: Floats = np.where(np.isnan(mutual), near, alpha * mutual + (1 - alpha) * near)
-    np.fill_diagonal(result, 1.0)
-    return result
+    S = np.empty_like(squared_m2)
+    _mix(squared_m2, mutual, alpha, sigma_m**2, S)
+    return S
+
+
+def matrix(distance_m: Floats, overlap: Floats, alpha: float, sigma: Sigma) -> Floats:
+    """Eqs. 15 and 16 from distances and overlaps (N, N; row i: share of i's image seen by j; NaN unknown)."""
+    mutual = mutual_overlap(overlap)
+    return similarity(mutual, np.square(distance_m), alpha, sigma_m(distance_m, mutual, sigma))
+
+
+@compiled
+def _companions(squared_m2: Floats, mutual: Floats) -> tuple[Floats, Floats]:
+    """Distances of everybody's two partners, those who share enough; and how far everybody's nearest robot is (N,).
+
+    Half of that if the two are known to share little: so far is too far, then.
+    """
+    count = len(squared_m2)
+    partners, found, nearest = np.empty(_PARTNERS * count), 0, np.empty(count)
+    for i in range(count):
+        first, second, one, other, near = _SHARED, _SHARED, -1, -1, -1
+        for j in range(count):
+            if j == i:
+                continue
+            if near < 0 or squared_m2[i, j] < squared_m2[i, near]:
+                near = j
+            # False where unknown. Of equals the nearer counts, whatever their order.
+            q = mutual[i, j]
+            if q > first or (q == first and one >= 0 and squared_m2[i, j] < squared_m2[i, one]):
+                second, other, first, one = first, one, q, j
+            elif q > second or (q == second and other >= 0 and squared_m2[i, j] < squared_m2[i, other]):
+                second, other = q, j
+        for partner in (one, other):
+            if partner >= 0:
+                partners[found] = squared_m2[i, partner]
+                found += 1
+        nearest[i] = squared_m2[i, near] / (4 if mutual[i, near] <= _SHARED else 1)
+    return np.sqrt(partners[:found]), np.sqrt(nearest)
+
+
+@compiled
+def _mix(squared_m2: Floats, mutual: Floats, alpha: float, sigma2_m2: float, S: Floats) -> None:
+    """Fill S: Eqs. 15 and 16 in one pass over one half, and what is unknown by chains."""
+    count = len(squared_m2)
+    known_everything = True
+    for i in range(count):
+        S[i, i] = 1.0
+        for j in range(i):
+            near = np.exp(-squared_m2[i, j] / sigma2_m2)
+            q = mutual[i, j]
+            if np.isnan(q):
+                known_everything = False
+                S[i, j] = near
+            else:
+                S[i, j] = alpha * q + (1 - alpha) * near
+            S[j, i] = S[i, j]
+    if not known_everything:
+        _chain(mutual, alpha, S)
+
+
+@compiled
+def _chain(mutual: Floats, alpha: float, S: Floats) -> None:
+    """Where the overlap is unknown S holds d_ij: mix in what the best link passes on, where there is one."""
+    count = len(mutual)
+    for i in range(count):
+        if not np.isnan(mutual[i, :i]).any():
+            continue
+        links = _links(mutual[i], i)
+        for j in range(i):
+            if np.isnan(mutual[i, j]):
+                best = 0.0
+                for k in links:
+                    # The rest passes on less, for nobody shares more than everything.
+                    if mutual[i, k] <= best:
+                        break
+                    q = mutual[i, k] * mutual[j, k] if k != j else 0.0
+                    if q > best:
+                        best = q
+                if best > 0:
+                    S[i, j] = alpha * best + (1 - alpha) * S[i, j]
+                    S[j, i] = S[i, j]
+
+
+@compiled
+def _links(mutual: Floats, i: int) -> NDArray[np.int64]:
+    """With whom a robot i sees something in common, the most first, by its mutual overlaps (N,)."""
+    found = np.flatnonzero(mutual > 0)
+    found = found[found != i]
+    ordered: NDArray[np.int64] = found[np.argsort(-mutual[found], kind="mergesort")]
+    return ordered

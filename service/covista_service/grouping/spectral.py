@@ -6,32 +6,49 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh
+from scipy.sparse.linalg import eigsh
 
+from covista_service.grouping.k_means import Labels, k_means
 from covista_service.grouping.similarity import Floats
 
-Labels = NDArray[np.intp]
-# Up to this many robots every row starts a seeding; a larger swarm is seeded from evenly spread rows.
-MAX_STARTS = 200
-_STARTS_BEYOND = 32
-# k-means runs from the best few seedings.
-_FEW = 3
-_ROUNDS = 30
+# Up to this many robots every row starts a seeding; a larger swarm is seeded from that many rows.
+MAX_STARTS = 48
+# From this many robots on, few eigenvectors are cheaper found one by one than all at once, if they are fewer than a
+# certain share of all.
+PARTIAL_FROM = 200
+PARTIAL_SHARE = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spectrum:
-    """Eigenvectors (N, N) of D^-1/2 S D^-1/2 as columns, largest eigenvalue first: one serves every M."""
+    """Eigenvectors of D^-1/2 S D^-1/2 as columns (N, k), the largest eigenvalues (k,) first: one serves every M <= k.
+
+    `degree` (N,): how much each robot has in common with all.
+    """
 
     vectors: Floats
+    values: Floats
+    degree: Floats
 
     @classmethod
-    def of(cls, S: Floats) -> Spectrum:
-        """Decompose a symmetric similarity matrix (N, N) with s_ii = 1."""
+    def of(cls, S: Floats, most: int | None = None) -> Spectrum:
+        """Decompose a symmetric similarity matrix (N, N) with s_ii = 1, as far as `most` groups need; None: wholly."""
         if S.ndim != 2 or S.shape[0] != S.shape[1] or not len(S):
             raise ValueError(f"a similarity matrix is square and not empty, not {S.shape}")
-        scale = 1 / np.sqrt(S.sum(axis=1))
-        vectors = np.linalg.eigh(scale[:, None] * S * scale)[1]
-        return cls(np.ascontiguousarray(vectors[:, ::-1]))
+        degree = S.sum(axis=1)
+        scale = 1 / np.sqrt(degree)
+        normalised = scale[:, None] * S * scale
+        if most is None or len(S) < PARTIAL_FROM or most > PARTIAL_SHARE * len(S):
+            values, vectors = eigh(normalised, overwrite_a=True, check_finite=False)
+        else:
+            values, vectors = _largest(normalised, most)
+        return cls(np.ascontiguousarray(vectors[:, ::-1]), values[::-1], degree)
+
+    @property
+    def most(self) -> int:
+        """Up to how many groups it serves."""
+        return int(self.vectors.shape[1])
 
     def rows(self, m: int) -> Floats:
         """Rows (N, m) of the m first eigenvectors, at unit length (a row of zeros stays)."""
@@ -50,82 +67,21 @@ def partition(spectrum: Spectrum, m: int) -> Labels:
         return np.zeros(count, np.intp)
     if m == count:
         return np.arange(count)
-    rows = spectrum.rows(m)
-    return canonical(_k_means(rows, _best_seeds(rows, m)))
+    return k_means(spectrum.rows(m), m, _starts(spectrum.degree))
 
 
-def canonical(labels: Labels) -> Labels:
-    """The same groups, numbered in the order of their first robots."""
-    _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
-    rank = np.empty(len(first), np.intp)
-    rank[np.argsort(first)] = np.arange(len(first))
-    return rank[inverse]
+def _starts(degree: Floats) -> NDArray[np.intp]:
+    """All rows, or some that are evenly spread over how much robots have in common: the same ones in any order."""
+    if len(degree) <= MAX_STARTS:
+        return np.arange(len(degree))
+    spread = np.linspace(0, len(degree) - 1, MAX_STARTS).astype(np.intp)
+    return np.argsort(degree, kind="stable")[spread]
 
 
-def _starts(count: int) -> NDArray[np.intp]:
-    if count <= MAX_STARTS:
-        return np.arange(count)
-    return np.linspace(0, count - 1, _STARTS_BEYOND).astype(np.intp)
-
-
-def _best_seeds(rows: Floats, m: int) -> NDArray[np.intp]:
-    """Orthogonal seedings of unit rows (N, m), the cheapest few (<= 3, m) of one from every start.
-
-    From each start the next seed is the row whose largest |cosine| with the seeds so far is least. The cost of a
-    seeding is the squared distance of all rows to their nearest seeds.
-    """
-    cosine = rows @ rows.T
-    size = np.abs(cosine)
-    last = _starts(len(rows))
-    everyone = np.arange(len(last))
-    seeds = np.empty((len(last), m), np.intp)
-    seeds[:, 0] = last
-    taken, nearest = size[last], cosine[last]
-    room = np.empty_like(taken)
-    for step in range(1, m):
-        taken[everyone, last] = np.inf
-        last = taken.argmin(axis=1)
-        seeds[:, step] = last
-        np.maximum(taken, size.take(last, axis=0, out=room, mode="clip"), out=taken)
-        np.maximum(nearest, cosine.take(last, axis=0, out=room, mode="clip"), out=nearest)
-    cost = -nearest.sum(axis=1)
-    chosen: dict[tuple[int, ...], int] = {}
-    for start in np.argsort(np.round(cost, 9), kind="stable"):
-        chosen.setdefault(tuple(sorted(seeds[start].tolist())), int(start))
-        if len(chosen) == _FEW:
-            break
-    return np.array(list(chosen), np.intp)
-
-
-def _k_means(rows: Floats, seeds: NDArray[np.intp]) -> Labels:
-    """Lloyd's rounds from rows `seeds` (runs, m), all runs at once: the cheapest labels, with no group empty."""
-    m = seeds.shape[1]
-    centres = rows[seeds]
-    labels = np.full((len(seeds), len(rows)), -1, np.intp)
-    for _ in range(_ROUNDS):
-        # Less |row|^2, which is the same for all centres.
-        distance = np.square(centres).sum(axis=2)[:, None, :] - 2 * rows @ centres.transpose(0, 2, 1)
-        fresh = distance.argmin(axis=2)
-        for run in range(len(seeds)):
-            _occupy(fresh[run], distance[run], m)
-        if np.array_equal(fresh, labels):
-            break
-        labels = fresh
-        member = (labels[:, None, :] == np.arange(m)[:, None]).astype(np.float64)
-        centres = (member @ rows) / member.sum(axis=2, keepdims=True)
-    cost = [float(np.square(rows - centre[label]).sum()) for centre, label in zip(centres, labels, strict=True)]
-    best: Labels = labels[int(np.argmin(np.round(cost, 12)))]
-    return best
-
-
-def _occupy(labels: Labels, distance: Floats, m: int) -> None:
-    """Give every empty group the row that lies farthest from its own centre among those that can be spared."""
-    sizes = np.bincount(labels, minlength=m)
-    if sizes.all():
-        return
-    for empty in np.flatnonzero(sizes == 0):
-        own = np.where(sizes[labels] > 1, distance[np.arange(len(labels)), labels], -np.inf)
-        row = int(own.argmax())
-        sizes[labels[row]] -= 1
-        labels[row] = empty
-        sizes[empty] = 1
+def _largest(normalised: Floats, most: int) -> tuple[Floats, Floats]:
+    """The `most` largest eigenvalues, rising, and their eigenvectors, by Lanczos."""
+    # Any start will do, if it is no eigenvector and the same every time.
+    start = 1 + 0.1 * np.cos(np.arange(len(normalised)))
+    values, vectors = eigsh(normalised, k=most, which="LA", v0=start, tol=1e-10)
+    order = np.argsort(values)
+    return values[order], vectors[:, order]

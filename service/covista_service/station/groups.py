@@ -7,13 +7,15 @@ from dataclasses import replace
 import numpy as np
 from covista_schemas.reports import EventKind
 
-from covista_service.grouping import similarity as eqs
 from covista_service.grouping.affinity import Affinity
+from covista_service.grouping.bounds import Bounds
 from covista_service.grouping.continuity import Change, Members, changes, follow
-from covista_service.grouping.selection import Choice, SelectionOptions, choose
+from covista_service.grouping.hysteresis import HysteresisOptions, Pending, Standing, weigh
+from covista_service.grouping.k_means import Labels
 from covista_service.grouping.similarity import Floats
 from covista_service.station.events import Effect, GroupsChanged, Happened, Pair
 from covista_service.station.options import GroupingOptions, StationOptions, nanoseconds
+from covista_service.station.proposal import Proposal, propose
 from covista_service.station.snapshot import GroupsView, GroupView, Reason, SimilarityView
 
 # Keyframes that come together are evaluated together.
@@ -25,17 +27,21 @@ class Groups:
     """Affinity of the robots that can be grouped, and the labelled groups that stand since `revision`."""
 
     def __init__(self, options: StationOptions) -> None:
-        self._affinity = Affinity()
+        self._affinity = Affinity(options.grouping.smoothing)
         self._regroup_after_ns = nanoseconds(options.regroup_after_s)
         self._apart_ns = nanoseconds(min(options.regroup_after_s, _APART_S))
         self._members: dict[str, Members] = {}
         self._label_of: dict[str, str] = {}
         self._next_label = 1
+        # Changes that settings propose and that are not shown yet.
+        self._pending: tuple[Pending, ...] = ()
         # News of robots or settings is evaluated at once, drift of positions and overlaps a few times a second.
         self._news = self._drift = False
+        # What new settings propose is shown at once.
+        self._set_anew = False
         self._evaluated_ns = 0
         self.view = GroupsView(options.revision, 0, (), (), (), options.grouping)
-        self.similarity = SimilarityView(0, (), *(_frozen(np.zeros((0, 0))) for _ in range(4)))
+        self.similarity = SimilarityView(0, (), 1.0, *(_frozen(np.zeros((0, 0))) for _ in range(3)))
 
     def __contains__(self, robot: object) -> bool:
         return robot in self._affinity
@@ -73,7 +79,8 @@ class Groups:
     def set_options(self, options: GroupingOptions) -> None:
         """Group by other settings from the next evaluation on."""
         self.view = replace(self.view, settings=options)
-        self._news = True
+        self._affinity.smoothing = options.smoothing
+        self._news = self._set_anew = True
 
     def may_evaluate(self, now_ns: int) -> bool:
         """Is the last evaluation over for long enough that news of a keyframe need not wait for that of others?"""
@@ -87,36 +94,63 @@ class Groups:
         # A clock that was set back must not make drift wait until it is where it was.
         recent = 0 <= now_ns - self._evaluated_ns < self._regroup_after_ns
         drifted = self._drift and (at_once or not recent)
-        if self._news or drifted:
-            scores, members = self._regroup()
-            self._news = self._drift = False
+        effects: list[Effect] = []
+        if self._news or drifted or self._pending_is_due(now_ns):
+            noted = self.view.note
+            members = self._regroup(now_ns)
+            if self.view.note not in {None, noted}:
+                effects.append(Happened(EventKind.WARNING, now_ns, f"groups: {self.view.note}"))
+            self._news = self._drift = self._set_anew = False
             self._evaluated_ns = now_ns
         elif ungrouped != self.view.ungrouped:
-            scores, members = self.view.scores, self._members
+            members = self._members
         else:
             return []
-        revision, settings = self.view.revision, self.view.settings
         if members == self._members and ungrouped == self.view.ungrouped:
-            self.view = replace(self.view, scores=scores)
-            return []
+            return effects
         groups = tuple(GroupView(label, tuple(sorted(robots))) for label, robots in members.items())
-        self.view = GroupsView(revision + 1, now_ns, groups, ungrouped, scores, settings)
-        return self._tell(members, now_ns)
+        revision = self.view.revision + 1
+        self.view = replace(self.view, revision=revision, time_ns=now_ns, groups=groups, ungrouped=ungrouped)
+        return effects + self._tell(members, now_ns)
 
-    def _regroup(self) -> tuple[tuple[tuple[int, float], ...], dict[str, Members]]:
-        """Choose groups for the similarity as it is now, and name them."""
+    def _pending_is_due(self, now_ns: int) -> bool:
+        after_ns = nanoseconds(self.view.settings.hysteresis.persistence_s)
+        return any(now_ns - change.since_ns >= after_ns for change in self._pending)
+
+    def _regroup(self, now_ns: int) -> dict[str, Members]:
+        """Weigh the groups that are proposed now against those on show, and name what comes of it."""
         affinity, options = self._affinity, self.view.settings
-        distance_m, overlap = affinity.distance_m, affinity.overlap
-        closeness = eqs.closeness(distance_m, options.sigma)
-        S = eqs.similarity(overlap, closeness, options.alpha)
-        matrices = (_frozen(matrix) for matrix in (S, overlap, closeness, distance_m))
-        self.similarity = SimilarityView(self.similarity.revision + 1, affinity.robots, *matrices)
-        choice = _choose(S, options)
-        robots = np.array(affinity.robots)
-        clusters = [frozenset(robots[choice.labels == label].tolist()) for label in np.unique(choice.labels)]
-        following = follow(self._members, clusters, self._next_label)
+        sigma_m = affinity.sigma_m(options.sigma)
+        S = affinity.similarity(options.alpha, sigma_m)
+        matrices = (_frozen(matrix) for matrix in (S, affinity.overlap, affinity.squared_m2))
+        self.similarity = SimilarityView(self.similarity.revision + 1, affinity.robots, sigma_m, *matrices)
+        proposal = propose(affinity, S, options, self._shown())
+        self.view = replace(self.view, scores=proposal.scores, note=proposal.note)
+        standing = self._weigh(proposal, now_ns)
+        self._pending = standing.pending
+        following = follow(self._members, standing.clusters, self._next_label)
         self._next_label = following.next_label
-        return choice.scores, following.groups
+        return following.groups
+
+    def _shown(self) -> Labels:
+        """The groups on show as labels (N,); newcomers stand alone."""
+        rows = {label: row for row, label in enumerate(self._members)}
+        labels = [rows.get(self._label_of.get(robot, ""), -1) for robot in self._affinity.robots]
+        new = len(rows) + np.arange(len(labels))
+        return np.unique(np.where(np.array(labels, np.intp) < 0, new, labels), return_inverse=True)[1].astype(np.intp)
+
+    def _weigh(self, proposal: Proposal, now_ns: int) -> Standing:
+        robots, options = self._affinity.robots, self.view.settings.hysteresis
+        at_once = HysteresisOptions(gain=0.0, persistence_s=0.0)
+        arguments = (self._members, robots, proposal.labels, proposal.contributions, now_ns)
+        if self._set_anew:
+            return weigh(*arguments, at_once)
+        standing = weigh(*arguments, options, self._pending)
+        if _keeps(standing.clusters, proposal.bounds):
+            return standing
+        # Some changes of a proposal that keeps the bounds need not keep them without the others.
+        still = weigh(*arguments, replace(options, gain=np.inf, persistence_s=np.inf), self._pending)
+        return still if _keeps(still.clusters, proposal.bounds) else weigh(*arguments, at_once)
 
     def _tell(self, members: dict[str, Members], now_ns: int) -> list[Effect]:
         """What follows from a new revision."""
@@ -139,12 +173,10 @@ class Groups:
         return "; ".join(parts) or "no robots"
 
 
-def _choose(S: Floats, options: GroupingOptions) -> Choice:
-    """As many groups as asked for, or as there are robots."""
-    groups = options.groups
-    if isinstance(groups, int):
-        groups = min(groups, len(S))
-    return choose(S, SelectionOptions(groups, options.criterion))
+def _keeps(clusters: tuple[Members, ...], bounds: Bounds) -> bool:
+    """Are groups as many and as large as they have to be?"""
+    count = sum(map(len, clusters))
+    return not count or (len(clusters) in bounds.numbers(count) and min(map(len, clusters)) >= bounds.min_group_size)
 
 
 def _own(groups: dict[str, Members], label: str | None) -> tuple[str, Members] | None:

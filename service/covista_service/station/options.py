@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal
 
-from covista_service.grouping.selection import Criterion, Groups
+from covista_service.grouping.bounds import Groups
+from covista_service.grouping.hysteresis import HysteresisOptions
+from covista_service.grouping.selection import Criterion
 from covista_service.grouping.similarity import Sigma
 
 NS_PER_S = 1_000_000_000
@@ -12,12 +15,20 @@ NS_PER_S = 1_000_000_000
 
 @dataclass(frozen=True, slots=True)
 class GroupingOptions:
-    """The settings that may change while the station runs: Eqs. 15 to 17."""
+    """The settings that may change while the station runs: Eqs. 15 to 17, and how steady groups are.
+
+    Groups are made from the similarity (`spectral`), of what similarities above a threshold link (`components`), or
+    from closeness alone (`distance`). `smoothing` is the weight of a pair's newest overlap.
+    """
 
     alpha: float = 0.5
     groups: Groups = "auto"
-    sigma: Sigma = "std"
-    criterion: Criterion = "fiedler"
+    min_group_size: int = 1
+    sigma: Sigma = "shared"
+    criterion: Criterion = "adaptive"
+    grouping: Literal["spectral", "components", "distance"] = "spectral"
+    hysteresis: HysteresisOptions = field(default_factory=HysteresisOptions)
+    smoothing: float = 0.3
 
 
 @dataclass(frozen=True, slots=True)

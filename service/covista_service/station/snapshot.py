@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import Literal
 
+import numpy as np
 from covista_schemas.reports import FoundBy, Status
 
-from covista_service.grouping.similarity import Floats
+from covista_service.grouping.similarity import Floats, closeness
 from covista_service.perception.camera import Camera
 from covista_service.perception.certainty import Interval
 from covista_service.perception.comparison import Comparison
@@ -79,14 +80,27 @@ class PairView:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimilarityView:
-    """The matrices (N, N) of the last evaluation in the order of `robots`; unknown overlaps are NaN."""
+    """The matrices (N, N) of the last evaluation in the order of `robots`; unknown overlaps are NaN.
+
+    `sigma_m` is the range of Eq. 15. Distances and closeness are computed when somebody asks.
+    """
 
     revision: int
     robots: tuple[str, ...]
+    sigma_m: float
     similarity: Floats
     overlap: Floats
-    closeness: Floats
-    distance_m: Floats
+    squared_m2: Floats
+
+    @property
+    def distance_m(self) -> Floats:
+        """|r_i - r_j| (N, N) in metres."""
+        return np.sqrt(self.squared_m2)
+
+    @property
+    def closeness(self) -> Floats:
+        """d_ij of Eq. 15, (N, N)."""
+        return closeness(self.distance_m, self.sigma_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +113,10 @@ class GroupView:
 
 @dataclass(frozen=True, slots=True)
 class GroupsView:
-    """The grouping in force since `time_ns`, and the scores of the numbers of groups as last evaluated."""
+    """The grouping in force since `time_ns`.
+
+    The scores of the numbers of groups, and a note on settings that cannot be kept, are as last evaluated.
+    """
 
     revision: int
     time_ns: int
@@ -107,6 +124,7 @@ class GroupsView:
     ungrouped: tuple[tuple[str, Reason], ...]
     scores: tuple[tuple[int, float], ...]
     settings: GroupingOptions
+    note: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

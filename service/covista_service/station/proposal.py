@@ -1,0 +1,63 @@
+"""The groups that the settings propose for the similarity as it is now, and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from covista_service.grouping import selection
+from covista_service.grouping.affinity import Affinity
+from covista_service.grouping.bounds import Bounds
+from covista_service.grouping.components import components
+from covista_service.grouping.k_means import Labels
+from covista_service.grouping.scores import outsider
+from covista_service.grouping.selection import Contributions, SelectionOptions
+from covista_service.grouping.similarity import Floats
+from covista_service.station.options import GroupingOptions
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Proposal:
+    """Labels (N,) in the order of the affinity's robots, the score of every number of groups, and a note if any.
+
+    `contributions` tell what each robot adds to the score of any grouping; `bounds` are those in force.
+    """
+
+    labels: Labels
+    scores: tuple[tuple[int, float], ...]
+    note: str | None
+    contributions: Contributions
+    bounds: Bounds
+
+
+def propose(affinity: Affinity, S: Floats, options: GroupingOptions, start: Labels | None) -> Proposal:
+    """Group the robots of an affinity by their similarity S (N, N).
+
+    Bounds that so many robots cannot keep are loosened, and the note says so. `start` (N,) are the groups on show.
+    """
+    count = len(S)
+    alpha = options.alpha
+    if options.grouping == "distance":
+        alpha = 0.0
+        S = affinity.similarity(alpha, options.sigma)
+    asked = Bounds(options.groups, options.min_group_size)
+    refusal = asked.refusal(count) if count else None
+    bounds = asked if refusal is None else asked.loosened(count)
+    chosen_by = SelectionOptions(bounds.groups, options.criterion, bounds.min_group_size, outsider(alpha))
+    note = refusal or _note(options, count)
+    if options.grouping == "components":
+        chosen_by = replace(chosen_by, criterion="silhouette")
+        contributions = selection.contributions(S, chosen_by)
+        labels = components(S, chosen_by.stranger, bounds)
+        formed = len(np.unique(labels))
+        scores = ((formed, float(contributions(labels).sum())),) if count else ()
+        return Proposal(labels, scores, note, contributions, bounds)
+    choice = selection.choose(S, chosen_by, start)
+    return Proposal(choice.labels, choice.scores, note, selection.contributions(S, chosen_by), bounds)
+
+
+def _note(options: GroupingOptions, count: int) -> str | None:
+    if options.grouping != "components" and options.criterion == "paper" and count > selection.PAPER_UP_TO:
+        return f"criterion paper is not meant for more than {selection.PAPER_UP_TO} robots, and these are {count}"
+    return None
