@@ -73,7 +73,7 @@ compose-test: .venv/.dev ## Station and rovers as containers, seen from outside
 
 # Here, so that the first start need not wait for a compiler.
 define warm
-echo "Compiling what is compiled (half a minute)" && $(BIN)/python -c 'from covista_service.perception.warming import warm_up; warm_up()'
+echo "Compiling what is compiled (half a minute)" && $(BIN)/python -c 'from covista_service.workers import load; load()'
 endef
 
 define need_engine

@@ -23,6 +23,7 @@ from covista_schemas.codec import BAD_IMAGE
 from covista_schemas.errors import DecodeError
 from numpy.typing import NDArray
 
+from covista_service.grouping import warming as grouping_warming
 from covista_service.perception.camera import Features
 from covista_service.perception.comparison import Comparison, compare
 from covista_service.perception.scene import Evidence, SceneOptions, Settled, Sight, settle
@@ -57,7 +58,11 @@ class Workers:
         self._pool = _pool(options)
         # Processes take a second or two to start, and compiled code to load: now is better than when the first robot
         # waits. Threads share what one of them has loaded.
-        self._warming = [self._submit(warm_up) for _ in range(1 if options.kind == "threads" else options.count)]
+        self._here = ThreadPoolExecutor(1, "covista-loading")
+        if options.kind == "threads":
+            self._warming = [self._submit(load)]
+        else:
+            self._warming = [self._here.submit(load), *(self._submit(warm_up) for _ in range(options.count))]
         for one in self._warming:
             one.add_done_callback(_tell_failure)
 
@@ -91,6 +96,7 @@ class Workers:
     def close(self) -> None:
         """Let jobs under way end, and drop those that wait."""
         self._closed = True
+        self._here.shutdown(wait=True, cancel_futures=True)
         self._pool.shutdown(wait=True, cancel_futures=True)
 
     def _submit(self, job: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> Future[_T]:
@@ -114,6 +120,12 @@ class Workers:
 def _tell_failure(warming: Future[None]) -> None:
     if not warming.cancelled() and (failure := warming.exception()) is not None:
         log.warning("compiled code could not be loaded ahead; the first keyframes will wait for it", exc_info=failure)
+
+
+def load() -> None:
+    """Load all compiled code into this process: that of workers, and that of the loop which groups and reads."""
+    grouping_warming.warm_up()
+    warm_up()
 
 
 def extract(image: bytes, width: int, height: int) -> tuple[Features, bytes | None]:

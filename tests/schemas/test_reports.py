@@ -48,7 +48,7 @@ def test_readers_pass_over_what_later_stations_say() -> None:
     )
     later = json.loads(report.model_dump_json())
     later |= {"mood": "good"}
-    later["settings"] |= {"hysteresis": {"gain": 1}}
+    later["settings"] |= {"weather": "fine"}
     assert GroupsReport.read(json.dumps(later)) == report
     # What people set is read strictly: a slip of the pen is not passed over.
     with pytest.raises(ValidationError):
@@ -79,7 +79,19 @@ def test_settings_come_back_as_they_went(groups: object) -> None:
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"alpha": 1.5}, {"groups": 0}, {"groups": {"min": 3, "max": 2}}, {"sigma": 0}, {"criterion": "x"}, {"colour": 1}],
+    [
+        {"alpha": 1.5},
+        {"groups": 0},
+        {"groups": {"min": 3, "max": 2}},
+        {"sigma": 0},
+        {"criterion": "x"},
+        {"colour": 1},
+        {"grouping": "x"},
+        {"min_group_size": 0},
+        {"hysteresis": {"gain": -1}},
+        {"hysteresis": {"smoothing": 0}},
+        {"hysteresis": {"x": 1}},
+    ],
 )
 def test_settings_that_make_no_sense_are_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(ValidationError):

@@ -196,5 +196,7 @@ def _happened(change: Change, now_ns: int, revision: int) -> Happened:
 
 
 def _frozen(matrix: Floats) -> Floats:
-    matrix.flags.writeable = False
-    return matrix
+    """The same numbers, for others to read alone."""
+    view = matrix.view()
+    view.flags.writeable = False
+    return view

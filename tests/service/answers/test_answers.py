@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
-from covista_schemas.reports import FoundBy, GroupBounds
+from covista_schemas.reports import FoundBy, GroupBounds, Hysteresis, LiveSettings
 from covista_service import answers
 from covista_service.answers.robots import quaternion_of
+from covista_service.grouping.hysteresis import HysteresisOptions
 from covista_service.perception.camera import Pose, rotation_of
 from covista_service.perception.comparison import Comparison
 from covista_service.perception.relative_pose import RelativePose
@@ -155,10 +156,38 @@ def test_groups_and_own_groups_agree(snapshot: Snapshot) -> None:
 
 
 def test_settings_are_told_as_they_are_set() -> None:
-    scene = Scene.of(grouping=GroupingOptions(0.25, (2, 3), 1.5, "paper"))
-    settings = answers.groups_report(scene.snapshot).settings
-    assert (settings.alpha, settings.sigma, settings.criterion) == (0.25, 1.5, "paper")
-    assert settings.groups == GroupBounds(min=2, max=3)
+    options = GroupingOptions(0.25, (2, 3), 2, 1.5, "paper", "distance", HysteresisOptions(0.1, 2.0), 0.5)
+    settings = answers.groups_report(Scene.of(grouping=options).snapshot).settings
+    assert settings == LiveSettings(
+        alpha=0.25,
+        groups=GroupBounds(min=2, max=3),
+        min_group_size=2,
+        sigma=1.5,
+        criterion="paper",
+        grouping="distance",
+        hysteresis=Hysteresis(gain=0.1, persistence_s=2.0, smoothing=0.5),
+    )
+
+
+def test_defaults_inside_are_those_outside() -> None:
+    assert answers.groups_report(Scene.of(grouping=GroupingOptions()).snapshot).settings == LiveSettings()
+
+
+def test_what_cannot_be_kept_is_noted() -> None:
+    scene = Scene.of(grouping=GroupingOptions(groups=3))
+    scene.send("r1")
+    scene.tick()
+    report = answers.groups_report(scene.snapshot)
+    assert report.note == "1 robot cannot form 3 groups"
+    assert [group.robots for group in report.groups] == [["r1"]]
+
+
+def test_components_are_a_criterion_of_their_own() -> None:
+    scene = Scene.of(grouping=GroupingOptions(grouping="components"))
+    scene.send("r1")
+    scene.tick()
+    report = answers.groups_report(scene.snapshot)
+    assert (report.criterion, [score.groups for score in report.scores]) == ("components", [1])
 
 
 @given(st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from covista_service.grouping.hysteresis import HysteresisOptions
 from covista_service.station.events import GroupsChanged
 from covista_service.station.options import GroupingOptions
 
@@ -141,3 +142,141 @@ def test_labels_stay_when_a_robot_comes_back() -> None:
     scene.send("a3", pose(0.2))
     scene.settle(share)
     assert groups(scene) == before
+
+
+def alone(**options: object) -> Scene:
+    """a3, whose group is about to be another."""
+    scene = Scene.of(regroup_after_s=0.0, grouping=GroupingOptions(smoothing=1.0, **options))
+    for robot, x_m in (("a1", 0.0), ("a2", 0.1), ("a3", 0.2), ("b1", 20.0), ("b2", 20.1)):
+        scene.send(robot, pose(x_m))
+    scene.settle(share)
+    # What the first views of few proposed is settled by then.
+    scene.wait(4.5)
+    return scene
+
+
+def drifts(scene: Scene, sees: float) -> list[str]:
+    """Kinds of what happened when a3 sees so much of what the other two see."""
+    scene.send("a3", pose(0.2))
+    found = {("a1", "a3"): sees, ("a2", "a3"): sees}
+
+    def share_of(job):
+        q = found.get((job.first.robot, job.second.robot), 0.9 if job.first.robot[0] == job.second.robot[0] else 0.0)
+        return measured(q, q)
+
+    return [kind for kind, _ in happenings(scene.settle(share_of))]
+
+
+STEADY = HysteresisOptions(gain=10.0, persistence_s=4.0)
+
+
+def test_a_change_without_a_clear_gain_waits_until_it_has_lasted() -> None:
+    scene = alone(hysteresis=STEADY, alpha=1.0)
+    assert ("a1", "a2", "a3") in groups(scene).values()
+    assert "split" not in drifts(scene, 0.0)
+    scene.wait(3.9)
+    assert ("a1", "a2", "a3") in groups(scene).values()
+    # Nothing new is heard: time alone brings it about.
+    assert "split" in [kind for kind, _ in happenings(scene.wait(0.2))]
+    assert ("a3",) in groups(scene).values()
+
+
+def test_a_change_that_is_taken_back_in_time_is_never_shown() -> None:
+    scene = alone(hysteresis=STEADY, alpha=1.0)
+    revision = scene.snapshot.groups.revision
+    for _ in range(4):
+        drifts(scene, 0.0)
+        scene.wait(2.0)
+        drifts(scene, 0.9)
+        scene.wait(2.0)
+    assert scene.snapshot.groups.revision == revision
+
+
+def test_without_hysteresis_every_change_is_shown_at_once() -> None:
+    scene = alone(hysteresis=HysteresisOptions(gain=0.0, persistence_s=0.0), alpha=1.0)
+    assert "split" in drifts(scene, 0.0)
+    assert "merge" in drifts(scene, 0.9)
+
+
+def test_new_settings_are_not_held_back() -> None:
+    scene = alone(hysteresis=STEADY)
+    scene.station.set_grouping(GroupingOptions(groups=4, hysteresis=STEADY))
+    scene.tick()
+    assert len(groups(scene)) == 4
+
+
+def test_who_comes_or_goes_is_not_held_back() -> None:
+    scene = alone(hysteresis=STEADY)
+    scene.send("a4", pose(0.15))
+    kinds = [kind for kind, _ in happenings(scene.settle(share))]
+    assert "join" in kinds
+    assert ("a1", "a2", "a3", "a4") in groups(scene).values()
+
+
+def test_smoothed_overlaps_follow_slowly() -> None:
+    scene = Scene.of(regroup_after_s=0.0, grouping=GroupingOptions(alpha=1.0, smoothing=0.5))
+    for robot in ("a1", "a2"):
+        scene.send(robot, pose(0.0))
+    scene.settle(lambda job: measured(0.8, 0.8))
+    before = scene.snapshot.similarity.similarity[0, 1]
+    scene.send("a1", pose(0.0))
+    scene.settle(lambda job: measured(0.4, 0.4))
+    view = scene.snapshot.similarity
+    assert view.overlap[0, 1] == pytest.approx(0.4)
+    assert 0.4 < view.similarity[0, 1] < before
+
+
+def test_settings_that_nobody_can_keep_are_noted_and_told_once() -> None:
+    scene = alone()
+    scene.station.set_grouping(GroupingOptions(groups=3, min_group_size=2))
+    told = happenings(scene.tick())
+    assert ("warning", "groups: 5 robots cannot form 3 groups of at least 2") in told
+    assert len(groups(scene)) == 3
+    assert scene.snapshot.groups.note == "5 robots cannot form 3 groups of at least 2"
+    assert not [kind for kind, _ in happenings(scene.wait(1.0)) if kind == "warning"]
+    scene.send("c1", pose(20.2))
+    scene.settle(share)
+    assert scene.snapshot.groups.note is None
+    assert sorted(map(len, groups(scene).values())) == [2, 2, 2]
+
+
+def test_the_printed_criterion_is_not_meant_for_large_swarms() -> None:
+    scene = Scene.of(grouping=GroupingOptions(criterion="paper"))
+    for number in range(31):
+        scene.send_pose(f"r{number:02}", pose(number))
+    scene.tick()
+    assert scene.snapshot.groups.note == "criterion paper is not meant for more than 30 robots, and these are 31"
+
+
+@pytest.mark.parametrize("grouping", ["components", "distance"])
+def test_groups_can_be_made_from_links_or_from_closeness_alone(grouping) -> None:
+    scene = two_groups()
+    scene.station.set_grouping(GroupingOptions(grouping=grouping))
+    scene.tick()
+    assert sorted(groups(scene).values()) == [("a1", "a2", "a3"), ("b1", "b2", "b3")]
+    # One who stands with the one group and sees what the other sees links them, where links count.
+    scene.send("a3", pose(20.05))
+    scene.settle(share)
+    scene.wait(10.0)
+    expected = ("a1", "a2", "a3", "b1", "b2", "b3") if grouping == "components" else ("a3", "b1", "b2", "b3")
+    assert expected in groups(scene).values()
+
+
+def test_no_settings_and_no_robots_are_no_reason_to_fail() -> None:
+    scene = Scene()
+    scene.station.set_grouping(GroupingOptions(groups=5, min_group_size=3))
+    assert scene.tick() == []
+    assert scene.snapshot.groups.groups == ()
+
+
+@pytest.mark.parametrize("criterion", ["adaptive", "silhouette", "gain", "fiedler", "paper", "eigengap", "modularity"])
+@pytest.mark.parametrize("x_m", [(0.0,), (1.0, 1.0), (2.0, 2.0, 2.0, 2.0)])
+def test_one_robot_and_robots_in_one_place_have_finite_scores(criterion, x_m: tuple[float, ...]) -> None:
+    scene = Scene.of(grouping=GroupingOptions(criterion=criterion))
+    for number, x in enumerate(x_m):
+        scene.send_pose(f"r{number}", pose(x))
+    scene.tick()
+    view = scene.snapshot
+    assert np.isfinite(view.similarity.similarity).all()
+    assert np.isfinite([score for _, score in view.groups.scores]).all()
+    assert sorted(robot for group in view.groups.groups for robot in group.robots) == sorted(view.robots)
