@@ -9,7 +9,7 @@ import io
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from covista_schemas.errors import MissingExtraError
@@ -74,8 +74,8 @@ def scatters(panels: Sequence[Panel], title: str, x_label: str, y_label: str) ->
     """A panel per method, all on the same square; the line is where an answer equals the truth."""
     columns = min(_COLUMNS, len(panels))
     rows = -(-len(panels) // columns)
-    with _styled():
-        figure = _figure(_PANEL_IN * columns + 0.4, _PANEL_IN * rows + 0.8)
+    with styled():
+        figure = blank(_PANEL_IN * columns + 0.4, _PANEL_IN * rows + 0.8)
         grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         for axes in grid.ravel()[len(panels) :]:
             axes.set_axis_off()
@@ -85,14 +85,14 @@ def scatters(panels: Sequence[Panel], title: str, x_label: str, y_label: str) ->
         figure.suptitle(title)
         figure.supxlabel(x_label, fontsize=10)
         figure.supylabel(y_label, fontsize=10)
-        return _png(figure)
+        return png(figure)
 
 
 def bars(groups: Sequence[str], series: Mapping[str, Sequence[float | None]], title: str, y_label: str) -> bytes:
     """Bars of each series side by side, group by group; None has no bar."""
     width = 0.8 / max(len(series), 1)
-    with _styled():
-        figure = _figure(max(6.0, 1.2 + _BAR_IN * len(groups) * (len(series) + 1)), 4.2)
+    with styled():
+        figure = blank(max(6.0, 1.2 + _BAR_IN * len(groups) * (len(series) + 1)), 4.2)
         axes = figure.subplots()
         for k, (name, values) in enumerate(series.items()):
             places = np.arange(len(groups)) + (k - (len(series) - 1) / 2) * width
@@ -110,13 +110,13 @@ def bars(groups: Sequence[str], series: Mapping[str, Sequence[float | None]], ti
         axes.set_title(title)
         if len(series) > 1:
             figure.legend(loc="outside lower center", ncols=min(len(series), 4))
-        return _png(figure)
+        return png(figure)
 
 
 def boxes(series: Mapping[str, Floats], title: str, y_label: str) -> bytes:
     """How the values of each series spread: median, quartiles, whiskers to 5 and 95 %, the mean as a diamond."""
-    with _styled():
-        figure = _figure(max(4.0, 1.4 + 0.9 * len(series)), 4.2)
+    with styled():
+        figure = blank(max(4.0, 1.4 + 0.9 * len(series)), 4.2)
         axes = figure.subplots()
         drawn = axes.boxplot(
             list(series.values()),
@@ -135,13 +135,22 @@ def boxes(series: Mapping[str, Floats], title: str, y_label: str) -> bytes:
         axes.grid(visible=False, axis="x")
         axes.set_ylabel(y_label)
         axes.set_title(title)
-        return _png(figure)
+        return png(figure)
 
 
-def curves(panels: Mapping[str, Sequence[Curve]], title: str, x_label: str, y_label: str) -> bytes:
-    """Panels, by title, of curves over a logarithmic x, y from 0 to 1; one legend, that of the first panel, for all."""
-    with _styled():
-        figure = _figure(_PANEL_IN * len(panels) + 0.6, _PANEL_IN + 1.0)
+def curves(
+    panels: Mapping[str, Sequence[Curve]],
+    title: str,
+    x_label: str,
+    y_label: str,
+    x_scale: Literal["log", "linear"] = "log",
+    top: float = 1.0,
+) -> bytes:
+    """Panels, by title, of curves, y from 0 to `top`; one legend, that of the first panel, for all."""
+    with styled():
+        # Two columns of the legend need three panels.
+        columns = 2 if len(panels) > 2 else 1
+        figure = blank(_PANEL_IN * len(panels) + 0.6, _PANEL_IN + 1.0)
         grid = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
         for axes, (name, drawn) in zip(grid, panels.items(), strict=True):
             for k, curve in enumerate(drawn):
@@ -149,12 +158,12 @@ def curves(panels: Mapping[str, Sequence[Curve]], title: str, x_label: str, y_la
                 width = 1.6 + 1.2 * (len(drawn) - 1 - k)
                 style = _DASHES[k % len(_DASHES)]
                 axes.plot(curve.x, curve.y, style, color=COLOURS[k % len(COLOURS)], lw=width, label=curve.label)
-            axes.set(xscale="log", ylim=(-0.02, 1.02), title=name, xlabel=x_label)
+            axes.set(xscale=x_scale, ylim=(-0.02 * top, 1.02 * top), title=name, xlabel=x_label)
         grid[0].set_ylabel(y_label)
         figure.suptitle(title)
         handles, labels = grid[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=2, handlelength=3.5)
-        return _png(figure)
+        figure.legend(handles, labels, loc="outside lower center", ncols=columns, handlelength=3.5)
+        return png(figure)
 
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> bytes:
@@ -167,8 +176,8 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
 
     widths = np.array(longest) + 3.0
     head = max(text.count("\n") for text in columns) + 1
-    with _styled():
-        figure = _figure(0.5 + 0.095 * widths.sum(), 0.45 + _ROW_IN * (len(rows) + head))
+    with styled():
+        figure = blank(0.5 + 0.095 * widths.sum(), 0.45 + _ROW_IN * (len(rows) + head))
         axes = figure.subplots()
         axes.set_axis_off()
         axes.set_title(title, loc="left", fontsize=11)
@@ -185,7 +194,7 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> 
             cell.set(edgecolor="#d0d0d0", facecolor="white" if row else "#eef2f6")
             cell.set_height((1 if row else head) / (len(rows) + head))
             cell.get_text().set_fontweight("normal" if row else "bold")
-        return _png(figure)
+        return png(figure)
 
 
 def _scatter(axes: Axes, panel: Panel) -> None:
@@ -196,21 +205,23 @@ def _scatter(axes: Axes, panel: Panel) -> None:
     axes.set_yticks(np.linspace(0, 1, 6))
 
 
-def _styled() -> AbstractContextManager[None]:
+def styled() -> AbstractContextManager[None]:
+    """While it holds, what is drawn has this module's looks; raises MissingExtraError without matplotlib."""
     need_matplotlib()
     from matplotlib import rc_context
 
     return rc_context(_STYLE)  # type: ignore[arg-type]  # its keys are literal types from 3.11 on, strings before
 
 
-def _figure(width_in: float, height_in: float) -> Figure:
+def blank(width_in: float, height_in: float) -> Figure:
     """A figure that draws itself with Agg: no window system, and none of pyplot's state."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width_in, height_in), dpi=_DPI, layout="constrained")
 
 
-def _png(figure: Figure) -> bytes:
+def png(figure: Figure) -> bytes:
+    """The figure as PNG bytes."""
     buffer = io.BytesIO()
     # Without the version in it the same figures give the same bytes everywhere.
     figure.savefig(buffer, format="png", metadata={"Software": None})

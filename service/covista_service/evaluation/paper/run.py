@@ -10,12 +10,18 @@ from covista_service.evaluation.files import make_folder
 from covista_service.evaluation.paper.chapter import Experiment, Item, Tell
 from covista_service.evaluation.paper.common_field import common_field
 from covista_service.evaluation.paper.correlation import correlation
+from covista_service.evaluation.paper.group_tables import group_tables
 from covista_service.evaluation.paper.invariance import invariance
+from covista_service.evaluation.paper.mover import mover
+from covista_service.evaluation.paper.trade_off import trade_off
 
 EXPERIMENTS: Mapping[str, Experiment] = {
     "common field": common_field,
     "invariance": invariance,
     "correlation": correlation,
+    "group tables": group_tables,
+    "trade-off": trade_off,
+    "mover": mover,
 }
 
 
