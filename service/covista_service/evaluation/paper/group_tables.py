@@ -149,7 +149,7 @@ def _groups_picture(name: str, table: PrintedTable) -> bytes:
         colour = {k + 1: int(label) for k, label in enumerate(found)}
         words = f"{_typeset(row)}: {grouped.text(grouped.members(found))}"
         stages.append(stage(table.scenario, words, colour, mutual=known.mutual))
-    title = f"{name}: groups of {table.scenario.name} from above\nLines: what two cameras have in common, grey between groups"
+    title = f"{name}: {table.scenario.name} from above\nLines: what two cameras see in common, grey between groups"
     return from_above(stages, title, ("group 1", "group 2"), columns=min(len(stages), 3))
 
 

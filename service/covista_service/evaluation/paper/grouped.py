@@ -6,13 +6,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from covista_service.grouping import similarity
 from covista_service.grouping.continuity import Members, follow
 from covista_service.grouping.selection import SelectionOptions, choose
 from covista_service.grouping.similarity import Floats, Sigma
-from covista_service.grouping.spectral import Labels
 
+Labels = NDArray[np.intp]
 # Numbers of the cameras of each group, from 1, as the paper prints them.
 Groups = tuple[tuple[int, ...], ...]
 _HALVINGS = 12
@@ -27,8 +28,8 @@ class Way:
 
 
 def into(count: int) -> Way:
-    """The paper's way to a given number of groups."""
-    return Way("std", SelectionOptions(count))
+    """The paper's way to a given number of groups: Ng-Jordan-Weiss."""
+    return Way("std", SelectionOptions(count, "fiedler"))
 
 
 # Tables II and III: two groups.
@@ -53,8 +54,8 @@ class Seen:
 
     @property
     def closeness(self) -> Floats:
-        """d_ij (N, N) of Eq. 15, sigma the standard deviation of the distances."""
-        return similarity.closeness(self.distance_m, "std")
+        """d_ij (N, N) of Eq. 15, sigma the standard deviation of the distances: what Eq. 16 is for alpha = 0."""
+        return self.similarity(0.0, TWO)
 
     def similarity(self, alpha: float, way: Way) -> Floats:
         """s_ij (N, N) of Eq. 16."""
@@ -64,6 +65,12 @@ class Seen:
 def labels(seen: Seen, alpha: float, way: Way) -> Labels:
     """Which group each camera is in, (N,), from 0 in the order of their first cameras."""
     return choose(seen.similarity(alpha, way), way.selection).labels
+
+
+def lead(seen: Seen, alpha: float, way: Way) -> float:
+    """By how much of its score the chosen number of groups is ahead of the next best."""
+    first, second, *_ = sorted((score for _, score in choose(seen.similarity(alpha, way), way.selection).scores))[::-1]
+    return (first - second) / first
 
 
 def groups(seen: Seen, alpha: float, way: Way) -> Groups:

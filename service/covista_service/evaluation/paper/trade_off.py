@@ -93,7 +93,7 @@ def _shape(each: TradeOff) -> list[Item]:
             NAME,
             f"{each.title}: at alpha = 0 the mean overlap is at most {SMALL:.2f} of that at 1",
             "extremely small",
-            f"{ratio:.2f} of it",
+            f"{each.overlap[0]:.3f}, {ratio:.2f} of it",
             ratio <= SMALL,
         ),
         Item(
