@@ -116,8 +116,8 @@ def _picture(snapshots: Sequence[Scenario], found: Sequence[Groups], title: str)
         for label, cameras in labelled.items():
             colours.setdefault(label, _colour(cameras))
         colour = {camera: colours[label] for label, cameras in labelled.items() for camera in cameras}
-        title = f"{each.name} mover at x = {x:g} m: {len(labelled)} groups"
-        stages.append(stage(each, title, colour, names=_NAMES))
+        caption = f"{each.name} mover at x = {x:g} m: {len(labelled)} groups"
+        stages.append(stage(each, caption, colour, names=_NAMES))
     return from_above(stages, title, ("blue: b1, b2, b3", "red: r1, r2", "green: g1, g2, g3", "m, the mover, alone"))
 
 

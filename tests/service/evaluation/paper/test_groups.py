@@ -160,5 +160,6 @@ def test_chapters_agree_and_are_drawn() -> None:
         "fig_8_default.png",
     }
     assert all(picture.shape[1] > 400 and picture.std() > 5 for picture in drawn.values())
+    assert (drawn["fig_8.png"] != drawn["fig_8_default.png"]).any()
     # Three rows of two panels.
     assert drawn["fig_8.png"].shape[0] > 1.5 * drawn["table_2_groups.png"].shape[0]
