@@ -8,6 +8,8 @@ from rich.markup import escape
 from rich.table import Table
 
 _NOTHING = "-"
+# Scores of so many numbers of groups are shown, the best ones.
+_BEST = 5
 
 
 def robots(report: RobotsReport) -> RenderableType:
@@ -51,9 +53,15 @@ def groups(report: GroupsReport) -> RenderableType:
         table.add_row(group.label, " ".join(group.robots))
     for alone in report.ungrouped:
         table.add_row(_NOTHING, f"{alone.robot} ({alone.reason})")
-    scores = ", ".join(f"{score.groups}: {score.score:.3f}" for score in report.scores)
-    why = f"revision {report.revision} of {report.time:%Y-%m-%d %H:%M:%S} UTC, by {report.criterion}"
-    return Group(table, f"{why} ({scores})" if scores else why)
+    lines = [f"revision {report.revision} of {report.time:%Y-%m-%d %H:%M:%S} UTC, by {report.criterion}"]
+    best = sorted(sorted(report.scores, key=lambda score: -score.score)[:_BEST], key=lambda score: score.groups)
+    if best:
+        lines.append(f"scores by number of groups: {', '.join(f'{each.groups}: {each.score:.3f}' for each in best)}")
+        rest = len(report.scores) - len(best)
+        lines[-1] += f", and {rest} that are worse" if rest else ""
+    if report.note is not None:
+        lines.append(f"note: {escape(report.note)}")
+    return Group(table, *lines)
 
 
 def groups_line(report: GroupsReport) -> str:

@@ -92,7 +92,7 @@ GROUPS = GroupsReport(
     time=_TIME,
     groups=[GROUP],
     ungrouped=[Ungrouped(robot="r3", reason="no_pose")],
-    criterion="fiedler",
+    criterion="adaptive",
     scores=[Score(groups=1, score=0.83)],
     settings=LiveSettings(),
 )

@@ -37,7 +37,7 @@ TWO = into(2)
 # Fig. 8: as many as Eq. 17 says.
 ADAPTIVE = Way("std", SelectionOptions("auto", "fiedler"))
 # What a station does that nobody has told otherwise.
-STATION = Way("std", SelectionOptions())
+STATION = Way("shared", SelectionOptions())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +59,7 @@ class Seen:
 
     def similarity(self, alpha: float, way: Way) -> Floats:
         """s_ij (N, N) of Eq. 16."""
-        return similarity.similarity(self.overlap, similarity.closeness(self.distance_m, way.sigma), alpha)
+        return similarity.matrix(self.distance_m, self.overlap, alpha, way.sigma)
 
 
 def labels(seen: Seen, alpha: float, way: Way) -> Labels:
