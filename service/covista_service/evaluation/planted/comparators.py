@@ -1,0 +1,49 @@
+"""What others would group by: simple rules on the same inputs."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from covista_service.evaluation.planted.layout import Labels
+from covista_service.evaluation.planted.swarm import Swarm
+from covista_service.perception.camera import Floats
+from covista_service.perception.comparators import coslam
+
+# Of two robots that share this much of their images, connected components make one group.
+LINKED = 0.3
+# Two robots have something in common from here on: twice the noise of an overlap, which is never exactly 0.
+SHARED = 0.1
+
+
+def components(swarm: Swarm) -> Labels:
+    """Robots whose overlaps (q_i + q_j)/2 reach `LINKED` belong together, and so do theirs."""
+    _, labels = connected_components(coo_array(mutual(swarm) >= LINKED), directed=False)
+    return np.asarray(labels, np.intp)
+
+
+def coslams(swarm: Swarm) -> Labels:
+    """CoSLAM's rule: robots that share anything and are not too far apart, and theirs (Zou and Tan 2013)."""
+    return coslam_groups(mutual(swarm) >= SHARED, swarm)
+
+
+def coslam_groups(sharing: NDArray[np.bool_], swarm: Swarm) -> Labels:
+    """The same for robots of which it is known who shares map points with whom, (N, N)."""
+    apart = distances(swarm)
+    count = len(swarm)
+    # The swarm is grouped where it stands, so its initial distances are those that it has.
+    mean = float(apart.sum()) / max(count * (count - 1), 1)
+    return np.asarray(coslam.groups(sharing.astype(np.int64), apart, mean), np.intp)
+
+
+def mutual(swarm: Swarm) -> Floats:
+    """(q_i + q_j)/2, (N, N), 0 where unknown: no rule of components has anything else to say of such a pair."""
+    both = (swarm.overlap + swarm.overlap.T) / 2
+    return np.where(np.isnan(both), 0.0, both)
+
+
+def distances(swarm: Swarm) -> Floats:
+    """|r_i - r_j|, (N, N)."""
+    return np.asarray(np.linalg.norm(swarm.positions_m[:, None] - swarm.positions_m, axis=2), np.float64)

@@ -1,0 +1,78 @@
+"""The figures of planted swarms as a table, as JSON and as plots."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from covista_service.evaluation.files import make_folder
+from covista_service.evaluation.planted.run import RunOptions
+from covista_service.evaluation.planted.trial import Figures, Trial, figures, size_classes
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+_SHOWN_KINDS = ("ground", "wall", "corridor", "terrain")
+
+
+def as_json(options: RunOptions, trials: Sequence[Trial]) -> str:
+    """The setting, the figures of every variant and method, and every trial."""
+    found = {
+        "setting": asdict(options),
+        "figures": [each.as_json() for each in figures(trials, options.largest)],
+        "trials": [asdict(trial) for trial in trials],
+    }
+    return json.dumps(found, allow_nan=False)
+
+
+def write(folder: Path, options: RunOptions, trials: Sequence[Trial]) -> None:
+    """planted.json, and for each variant its plots: SIZE over class of size, and how the ARI spreads."""
+    from covista_service.drawing import plots
+
+    make_folder(folder)
+    (folder / "planted.json").write_text(as_json(options, trials) + "\n", encoding="utf-8")
+    found = figures(trials, options.largest)
+    for variant in dict.fromkeys(each.variant for each in found):
+        here = [each for each in found if each.variant == variant]
+        names = [name for name in size_classes(options.largest) if any(each.by_size[name] is not None for each in here)]
+        series = {each.method: [each.by_size[name] for name in names] for each in here}
+        title = f"Grouping of planted swarms: {variant}"
+        by_size = plots.bars(names, series, title, "mean adjusted Rand index")
+        (folder / f"{variant}_by_size.png").write_bytes(by_size)
+        spread = {
+            each.method: np.array([t.ari for t in trials if (t.variant, t.method) == (variant, each.method)])
+            for each in here
+        }
+        (folder / f"{variant}_spread.png").write_bytes(plots.boxes(spread, title, "adjusted Rand index"))
+
+
+def tables(options: RunOptions, trials: Sequence[Trial]) -> list[Table]:
+    """A table of every variant."""
+    found = figures(trials, options.largest)
+    variants = dict.fromkeys(each.variant for each in found)
+    return [_table(variant, [each for each in found if each.variant == variant]) for variant in variants]
+
+
+def _table(variant: str, found: Sequence[Figures]) -> Table:
+    from rich.table import Table
+
+    table = Table(title=f"{variant}: adjusted Rand index over {found[0].swarms} swarms")
+    table.add_column("method", no_wrap=True)
+    titles = ("mean", "10 %", *found[0].by_size, "> 30", *_SHOWN_KINDS, "one kept", "apart kept", "ms")
+    for title in titles:
+        table.add_column(title, justify="right")
+    for each in found:
+        values = (each.ari, each.tenth, *each.by_size.values(), each.above_30)
+        kinds = (each.by_kind.get(kind) for kind in _SHOWN_KINDS)
+        kept = (each.kept_one, each.kept_apart)
+        table.add_row(each.method, *map(_figure, (*values, *kinds, *kept)), f"{each.ms_median:.2f}")
+    return table
+
+
+def _figure(value: float | None) -> str:
+    return "" if value is None else f"{value:.2f}"

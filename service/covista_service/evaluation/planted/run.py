@@ -1,0 +1,78 @@
+"""Plant swarms, group them by every method, and say how well."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+from covista_service.evaluation.planted.comparators import coslam_groups
+from covista_service.evaluation.planted.judging import adjusted_rand
+from covista_service.evaluation.planted.layout import Labels
+from covista_service.evaluation.planted.methods import FEATURES_CRITERION, METHODS, Method, by_similarity
+from covista_service.evaluation.planted.rendered import RenderedSwarm, rendered
+from covista_service.evaluation.planted.swarm import CLASSES, Disturbance, Swarm, disturbed, plant
+from covista_service.evaluation.planted.trial import Trial
+
+Tell = Callable[[str], None]
+
+# `measured`: noise, and pairs that nobody has compared. `predicted`: those have what poses and depths predict.
+# `biased`: each robot puts a factor of its own on all its overlaps.
+VARIANTS: Mapping[str, Disturbance] = {
+    "measured": Disturbance(),
+    "predicted": Disturbance(predicted=True),
+    "biased": Disturbance(bias=0.2),
+}
+RENDERED = "rendered"
+# Seeds of the first block, grouped once before anything is timed.
+_WARM = 0
+
+
+@dataclass(frozen=True, slots=True)
+class RunOptions:
+    """Which swarms: `seeds` of them from `first_seed`, of at most `largest` robots, and `rendered` more from images."""
+
+    seeds: int = 144
+    first_seed: int = 1000
+    largest: int = CLASSES[-1][1]
+    rendered: int = 4
+
+
+def run(options: RunOptions, tell: Tell = lambda _: None) -> Iterator[Trial]:
+    """A trial for each swarm, variant and method; `tell` hears of each swarm."""
+    small = disturbed(plant(_WARM), Disturbance())
+    for method in METHODS.values():
+        method(small)  # so that what is compiled on first use is not timed
+    for seed in range(options.first_seed, options.first_seed + options.seeds):
+        known = plant(seed, options.largest)
+        tell(f"seed {seed}: {known.kind}, {len(known.truth)} robots")
+        for name, disturbance in VARIANTS.items():
+            yield from _trials(name, disturbed(known, disturbance), METHODS)
+    for seed in range(options.first_seed, options.first_seed + options.rendered):
+        tell(f"rendered seed {seed}")
+        seen = rendered(seed)
+        yield from _trials(RENDERED, seen.swarm, methods_of(seen))
+
+
+def methods_of(seen: RenderedSwarm) -> dict[str, Method]:
+    """Every method for a rendered swarm: CoSLAM's by map points that are shared, and one by numbers of features."""
+    return {
+        **METHODS,
+        "coslam": partial(coslam_groups, seen.sharing),
+        "features": lambda _: by_similarity(seen.features, FEATURES_CRITERION),
+    }
+
+
+def _trials(variant: str, swarm: Swarm, methods: Mapping[str, Method]) -> Iterator[Trial]:
+    for name, method in methods.items():
+        start = time.perf_counter_ns()
+        labels = method(swarm)
+        ms = (time.perf_counter_ns() - start) / 1e6
+        ari = adjusted_rand(swarm.truth, labels)
+        counts = (_groups(labels), _groups(swarm.truth))
+        yield Trial(variant, name, swarm.kind, swarm.seed, len(swarm), *counts, ari, ms)
+
+
+def _groups(labels: Labels) -> int:
+    return len(set(labels.tolist()))
