@@ -20,6 +20,7 @@ from covista_service.evaluation.planted.layout import Labels
 from covista_service.evaluation.planted.swarm import Swarm
 from covista_service.evaluation.rendered import case_of, view_of
 from covista_service.perception.camera import Floats
+from covista_service.perception.survey import Outcome
 
 WORLDS = ("arena", "wall", "arena", "boxes")
 CAMERA = pinhole(320, 240)
@@ -35,7 +36,7 @@ class RenderedSwarm:
     """A swarm whose overlaps come from images, NaN where a pair was not answered.
 
     `features` (N, N): similarity by numbers of verified matches (Snavely et al. 2008). `sharing` (N, N): whether two
-    cameras have a map point in common.
+    cameras have map points in common, from matches that their geometry bears out.
     """
 
     swarm: Swarm
@@ -52,10 +53,10 @@ def rendered(seed: int) -> RenderedSwarm:
     pairs = tuple(combinations(range(len(poses)), 2))
     case = case_of([view_of(CAMERA, pose, render(world, CAMERA, pose).image) for pose in poses], pairs)
     answers = methods.METHODS["auto"](case)
-    counted, mapped = methods.METHODS["snavely"](case), methods.METHODS["coslam"](case)
+    counted = methods.METHODS["snavely"](case)
     sharing = np.eye(len(poses), dtype=np.bool_)
-    for (a, b), answer in mapped.items():
-        sharing[a, b] = sharing[b, a] = answer.inliers > 0
+    for a, b in pairs:
+        sharing[a, b] = sharing[b, a] = case.surveys[a, b].survey.outcome is Outcome.MEASURED
     positions = np.array([pose.position_m for pose in poses])
     swarm = Swarm(positions, _matrix(answers, len(poses), np.nan), truth, "rendered", seed)
     return RenderedSwarm(swarm, _matrix(counted, len(poses), 0.0), sharing)
