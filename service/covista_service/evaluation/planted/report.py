@@ -31,8 +31,9 @@ def as_json(options: RunOptions, trials: Sequence[Trial]) -> str:
 
 
 def write(folder: Path, options: RunOptions, trials: Sequence[Trial]) -> None:
-    """planted.json, and for each variant its plots: SIZE over class of size, and how the ARI spreads."""
+    """planted.json, and for each variant two plots: the ARI over classes of size, and how it spreads."""
     from covista_service.drawing import plots
+    from covista_service.drawing.class_plot import class_plot
 
     make_folder(folder)
     (folder / "planted.json").write_text(as_json(options, trials) + "\n", encoding="utf-8")
@@ -42,7 +43,7 @@ def write(folder: Path, options: RunOptions, trials: Sequence[Trial]) -> None:
         names = [name for name in size_classes(options.largest) if any(each.by_size[name] is not None for each in here)]
         series = {each.method: [each.by_size[name] for name in names] for each in here}
         title = f"Grouping of planted swarms: {variant}"
-        by_size = plots.bars(names, series, title, "mean adjusted Rand index")
+        by_size = class_plot(names, series, title, "mean adjusted Rand index")
         (folder / f"{variant}_by_size.png").write_bytes(by_size)
         spread = {
             each.method: np.array([t.ari for t in trials if (t.variant, t.method) == (variant, each.method)])
