@@ -17,8 +17,6 @@ from covista_service.evaluation.planted.trial import Figures, Trial, figures, si
 if TYPE_CHECKING:
     from rich.table import Table
 
-_SHOWN_KINDS = ("ground", "wall", "corridor", "terrain")
-
 
 def as_json(options: RunOptions, trials: Sequence[Trial]) -> str:
     """The setting, the figures of every variant and method, and every trial."""
@@ -60,19 +58,31 @@ def tables(options: RunOptions, trials: Sequence[Trial]) -> list[Table]:
 
 
 def _table(variant: str, found: Sequence[Figures]) -> Table:
+    """A row per method; columns in which there is nothing are left out."""
     from rich.table import Table
 
+    columns = {title: texts for title, texts in _columns(found).items() if any(texts)}
     table = Table(title=f"{variant}: adjusted Rand index over {found[0].swarms} swarms")
     table.add_column("method", no_wrap=True)
-    titles = ("mean", "10 %", *found[0].by_size, "> 30", *_SHOWN_KINDS, "one kept", "apart kept", "ms")
-    for title in titles:
+    for title in columns:
         table.add_column(title, justify="right")
-    for each in found:
-        values = (each.ari, each.tenth, *each.by_size.values(), each.above_30)
-        kinds = (each.by_kind.get(kind) for kind in _SHOWN_KINDS)
-        kept = (each.kept_one, each.kept_apart)
-        table.add_row(each.method, *map(_figure, (*values, *kinds, *kept)), f"{each.ms_median:.2f}")
+    for k, each in enumerate(found):
+        table.add_row(each.method, *(texts[k] for texts in columns.values()))
     return table
+
+
+def _columns(found: Sequence[Figures]) -> dict[str, list[str]]:
+    """What stands under each title, method by method."""
+    return {
+        "mean": [_figure(each.ari) for each in found],
+        "10 %": [_figure(each.tenth) for each in found],
+        **{size: [_figure(each.by_size[size]) for each in found] for size in found[0].by_size},
+        "> 30": [_figure(each.above_30) for each in found],
+        **{kind: [_figure(each.by_kind[kind]) for each in found] for kind in found[0].by_kind},
+        "one kept": [_figure(each.kept_one) for each in found],
+        "apart kept": [_figure(each.kept_apart) for each in found],
+        "ms": [f"{each.ms_median:.2f}" for each in found],
+    }
 
 
 def _figure(value: float | None) -> str:
