@@ -22,7 +22,7 @@ Contributions = Callable[[Labels], Floats]
 _Found = dict[int, tuple[float, Labels]]
 # A pair inside a group must be worth this share of what its robots find with their best companions: by the criterion
 # gain, and where adaptive begins (finer) and merges.
-GAIN = 0.65
+GAIN = 0.6
 FINE = 0.9
 MERGE = 0.7
 # Up to so many robots adaptive scores every number of groups; above, those from one to the number of fine groups.

@@ -17,7 +17,7 @@ EQUAL = 1e-6
 # Who sees more than this in common with somebody tells how far apart robots of one group stand.
 _SHARED = 0.25
 _PARTNERS = 2
-_REACH = 3.0
+_REACH = 2.5
 
 
 def sigma_m(distance_m: Floats, mutual: Floats, sigma: Sigma) -> float:
@@ -25,7 +25,7 @@ def sigma_m(distance_m: Floats, mutual: Floats, sigma: Sigma) -> float:
 
     A number is taken as given. `std`, as printed, is the standard deviation of the N(N - 1)/2 distances: their mean
     where all are equal (two robots, an equilateral triangle). It is the size of the arena, so in a large swarm
-    everybody is close to everybody. `shared` is 3 times the median distance from a robot to the two that it has most
+    everybody is close to everybody. `shared` is 2.5 times the median distance from a robot to the two that it has most
     in common with, of those who share more than a quarter. Where there are fewer than N/2 such partners, it is the
     median distance to the nearest robot, halved where the two are known to share less. 1 where all distances are 0.
     """
@@ -82,8 +82,8 @@ def similarity(mutual: Floats, squared_m2: Floats, alpha: float, sigma_m: float)
     """s_ij = alpha (q_ij + q_ji)/2 + (1 - alpha) d_ij, Eq. 16, with s_ii = 1.
 
     From mutual overlaps (N, N) and squared distances (N, N), m^2. An unknown overlap (NaN) is not zero overlap: it is
-    what the best chain over one other robot passes on, max over k of the product of the mutual overlaps. Where nobody
-    is such a link, distance alone speaks.
+    what the best chain over one other robot passes on, max over k of the product of the mutual overlaps. Where of
+    nobody both are known, distance alone speaks.
     """
     S = np.empty_like(squared_m2)
     _mix(squared_m2, mutual, alpha, sigma_m**2, S)
@@ -163,7 +163,7 @@ def _chain(mutual: Floats, alpha: float, S: Floats) -> None:
                     q = mutual[i, k] * mutual[j, k] if k != j else 0.0
                     if q > best:
                         best = q
-                if best > 0:
+                if best > 0 or _linked(mutual[i], mutual[j], i, j):
                     S[i, j] = alpha * best + (1 - alpha) * S[i, j]
                     S[j, i] = S[i, j]
 
@@ -175,3 +175,12 @@ def _links(mutual: Floats, i: int) -> NDArray[np.int64]:
     found = found[found != i]
     ordered: NDArray[np.int64] = found[np.argsort(-mutual[found], kind="mergesort")]
     return ordered
+
+
+@compiled
+def _linked(one: Floats, other: Floats, i: int, j: int) -> bool:
+    """Is there a robot whose overlaps with both are known, so that a chain that passes on nothing says something?"""
+    k = 0
+    while k < len(one) and (k in (i, j) or np.isnan(one[k] + other[k])):
+        k += 1
+    return k < len(one)

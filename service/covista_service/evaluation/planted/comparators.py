@@ -18,7 +18,7 @@ LINKED = 0.3
 SHARED = 0.1
 
 
-def components(swarm: Swarm) -> Labels:
+def overlapping(swarm: Swarm) -> Labels:
     """Robots whose overlaps (q_i + q_j)/2 reach `LINKED` belong together, and so do theirs."""
     _, labels = connected_components(coo_array(mutual(swarm) >= LINKED), directed=False)
     return np.asarray(labels, np.intp)

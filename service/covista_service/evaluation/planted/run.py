@@ -33,7 +33,7 @@ _WARM = 0
 class RunOptions:
     """Which swarms: `seeds` of them from `first_seed`, of at most `largest` robots, and `rendered` more from images."""
 
-    seeds: int = 144
+    seeds: int = 216
     first_seed: int = 1000
     largest: int = CLASSES[-1][1]
     rendered: int = 4

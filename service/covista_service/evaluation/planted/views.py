@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from covista_service.compiled import compiled
 from covista_service.evaluation.planted.scene import RANGE_M, Mask, Scene
 from covista_service.perception.camera import Floats
-from covista_service.perception.compiled import compiled
 
 FIELD_OF_VIEW_DEG = 65.0
 # Rays per image, across and down: all share one camera of 4 : 3.
