@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from covista_service.drawing.plots import COLOURS, INK, _figure, _png, _styled
+from covista_service.drawing.plots import COLOURS, INK, blank, png, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,8 +32,8 @@ def bands(panels: Mapping[str, Labels], marked: Mapping[int, str], title: str, x
     many groups colours come again, so a gap parts two labels of a robot. `marked` names rows.
     """
     heights = [labels.shape[1] for labels in panels.values()]
-    with _styled():
-        figure = _figure(_WIDTH_IN, 0.6 + sum(_PANEL_IN + _ROBOT_IN * height for height in heights))
+    with styled():
+        figure = blank(_WIDTH_IN, 0.6 + sum(_PANEL_IN + _ROBOT_IN * height for height in heights))
         grid = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
         for axes, (name, labels) in zip(grid, panels.items(), strict=True):
             _draw(axes, labels)
@@ -41,7 +41,7 @@ def bands(panels: Mapping[str, Labels], marked: Mapping[int, str], title: str, x
             axes.set_title(name, loc="left")
         grid[-1].set_xlabel(x_label)
         figure.suptitle(title)
-        return _png(figure)
+        return png(figure)
 
 
 def _draw(axes: Axes, labels: Labels) -> None:
