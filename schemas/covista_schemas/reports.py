@@ -226,11 +226,14 @@ class Hysteresis(Report):
     gain: float = Field(
         default=0.05,
         ge=0,
-        le=10,
-        description="A change is shown at once if it gains more than this share of the score of the groups it changes.",
+        le=0.9,
+        description="Share that groups on show have in the similarity that groups are made from: others must gain more.",
     )
     persistence_s: float = Field(
-        default=5.0, ge=0, le=3600, description="A change that gains less is shown when it has lasted so long, s."
+        default=5.0,
+        ge=0,
+        le=3600,
+        description="A change without a clear gain is shown when it has been proposed for so long.",
     )
     smoothing: float = Field(
         default=0.3, gt=0, le=1, description="Weight of a pair's newest overlap in the similarity; 1: no smoothing."

@@ -16,6 +16,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from covista_service.compiled import compiled
 from covista_service.grouping.continuity import Grouping, Members
 from covista_service.grouping.similarity import Floats
 
@@ -30,10 +31,12 @@ _NOTHING = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class HysteresisOptions:
-    """When a change is shown: at once for a clear gain, else when it has been proposed without a break for long enough.
+    """How much groups on show are held on to, and when a change that is proposed all the same is shown.
 
-    A gain is clear if every robot that moves brings more than `gain` times what a robot contributes on average. By 1
-    a robot that is found in another place altogether moves at once, and one on the verge waits.
+    New groups are made from a similarity a share `gain` of which are the groups on show (`held`): another grouping must
+    gain more than that share. It is shown at once if the gain is clear, else when it has been proposed without a break
+    for long enough. A gain is clear if every robot that moves brings more than `clear` times what a robot contributes
+    on average. By 1 a robot that is found in another place altogether moves at once, and one on the verge waits.
 
     `persistence_s` outlasts a few keyframes, which come about once a second: noise that is new with each of them goes
     one way five times running in 1 of 32 cases, and who drives from group to group is between them for longer.
@@ -41,8 +44,9 @@ class HysteresisOptions:
     leave a robot for as long in a group that it has left, and spare little more.
     """
 
-    gain: float = 1.0
+    gain: float = 0.05
     persistence_s: float = 5.0
+    clear: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +64,17 @@ class Standing:
 
     clusters: tuple[Members, ...]
     pending: tuple[Pending, ...] = ()
+
+
+@compiled
+def held(S: Floats, labels: _Labels, gain: float) -> Floats:
+    """Similarities (N, N) mixed with the groups on show, labels (N,): (1 - gain) s_ij + gain where i, j are together."""
+    mixed = np.empty_like(S)
+    for i in range(len(S)):
+        for j in range(len(S)):
+            mixed[i, j] = (1 - gain) * S[i, j] + (gain if labels[i] == labels[j] else 0.0)
+        mixed[i, i] = 1.0
+    return mixed
 
 
 def weigh(
@@ -98,7 +113,7 @@ def weigh(
         after = base.copy()
         after[rows] = len(base) + proposed[rows]
         lasts = now_ns - change.since_ns >= options.persistence_s * _NS_PER_S
-        wanted = options.gain * _moving(base[rows], proposed[rows])
+        wanted = options.clear * _moving(base[rows], proposed[rows])
         if lasts or _clear(contributions(_dense(after)) - before, wanted, average):
             result[rows] = after[rows]
         else:

@@ -124,7 +124,7 @@ class Groups:
         S = affinity.similarity(options.alpha, sigma_m)
         matrices = (_frozen(matrix) for matrix in (S, affinity.overlap, affinity.squared_m2))
         self.similarity = SimilarityView(self.similarity.revision + 1, affinity.robots, sigma_m, *matrices)
-        proposal = propose(affinity, S, options, self._shown())
+        proposal = propose(affinity, S, options, None if self._set_anew else self._shown())
         self.view = replace(self.view, scores=proposal.scores, note=proposal.note)
         standing = self._weigh(proposal, now_ns)
         self._pending = standing.pending
@@ -141,7 +141,7 @@ class Groups:
 
     def _weigh(self, proposal: Proposal, now_ns: int) -> Standing:
         robots, options = self._affinity.robots, self.view.settings.hysteresis
-        at_once = HysteresisOptions(gain=0.0, persistence_s=0.0)
+        at_once = HysteresisOptions(clear=0.0, persistence_s=0.0)
         arguments = (self._members, robots, proposal.labels, proposal.contributions, now_ns)
         if self._set_anew:
             return weigh(*arguments, at_once)
@@ -149,7 +149,7 @@ class Groups:
         if _keeps(standing.clusters, proposal.bounds):
             return standing
         # Some changes of a proposal that keeps the bounds need not keep them without the others.
-        still = weigh(*arguments, replace(options, gain=np.inf, persistence_s=np.inf), self._pending)
+        still = weigh(*arguments, replace(options, clear=np.inf, persistence_s=np.inf), self._pending)
         return still if _keeps(still.clusters, proposal.bounds) else weigh(*arguments, at_once)
 
     def _tell(self, members: dict[str, Members], now_ns: int) -> list[Effect]:

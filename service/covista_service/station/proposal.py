@@ -10,6 +10,7 @@ from covista_service.grouping import selection
 from covista_service.grouping.affinity import Affinity
 from covista_service.grouping.bounds import Bounds
 from covista_service.grouping.components import components
+from covista_service.grouping.hysteresis import held
 from covista_service.grouping.k_means import Labels
 from covista_service.grouping.scores import outsider
 from covista_service.grouping.selection import Contributions, SelectionOptions
@@ -31,16 +32,19 @@ class Proposal:
     bounds: Bounds
 
 
-def propose(affinity: Affinity, S: Floats, options: GroupingOptions, start: Labels | None) -> Proposal:
+def propose(affinity: Affinity, S: Floats, options: GroupingOptions, shown: Labels | None) -> Proposal:
     """Group the robots of an affinity by their similarity S (N, N).
 
-    Bounds that so many robots cannot keep are loosened, and the note says so. `start` (N,) are the groups on show.
+    Bounds that so many robots cannot keep are loosened, and the note says so. `shown` (N,) are the groups on show, to
+    hold on to.
     """
     count = len(S)
     alpha = options.alpha
     if options.grouping == "distance":
         alpha = 0.0
         S = affinity.similarity(alpha, options.sigma)
+    if shown is not None:
+        S = held(S, shown, options.hysteresis.gain)
     asked = Bounds(options.groups, options.min_group_size)
     refusal = asked.refusal(count) if count else None
     bounds = asked if refusal is None else asked.loosened(count)
@@ -53,7 +57,7 @@ def propose(affinity: Affinity, S: Floats, options: GroupingOptions, start: Labe
         formed = len(np.unique(labels))
         scores = ((formed, float(contributions(labels).sum())),) if count else ()
         return Proposal(labels, scores, note, contributions, bounds)
-    choice = selection.choose(S, chosen_by, start)
+    choice = selection.choose(S, chosen_by, shown)
     return Proposal(choice.labels, choice.scores, note, selection.contributions(S, chosen_by), bounds)
 
 

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 NS = 1_000_000_000
-AT_ONCE = HysteresisOptions(gain=0.0, persistence_s=0.0)
+AT_ONCE = HysteresisOptions(clear=0.0, persistence_s=0.0)
 # Half of what a robot contributes on average, for each that moves.
-OPTIONS = HysteresisOptions(gain=0.5, persistence_s=5.0)
+OPTIONS = HysteresisOptions(clear=0.5, persistence_s=5.0)
 ROBOTS = "abcdefgh"
 
 
@@ -236,7 +236,7 @@ def test_whatever_is_proposed_every_robot_that_is_there_stands_in_one_group(
     rng = np.random.default_rng(seed)
     standing = Standing(())
     for at_s, labels in enumerate(moments):
-        options = HysteresisOptions(gain, persistence_s)
+        options = HysteresisOptions(clear=gain, persistence_s=persistence_s)
         proposed = np.array(list(labels.values()), np.intp)
         values = inside(np.maximum.accumulate(rng.uniform(0, 1, (len(labels), len(labels)))))
         standing = weigh(shown(standing.clusters), list(labels), proposed, values, at_s * NS, options, standing.pending)

@@ -167,7 +167,7 @@ def drifts(scene: Scene, sees: float) -> list[str]:
     return [kind for kind, _ in happenings(scene.settle(share_of))]
 
 
-STEADY = HysteresisOptions(gain=10.0, persistence_s=4.0)
+STEADY = HysteresisOptions(persistence_s=4.0, clear=1e6)
 
 
 def test_a_change_without_a_clear_gain_waits_until_it_has_lasted() -> None:
@@ -193,7 +193,7 @@ def test_a_change_that_is_taken_back_in_time_is_never_shown() -> None:
 
 
 def test_without_hysteresis_every_change_is_shown_at_once() -> None:
-    scene = alone(hysteresis=HysteresisOptions(gain=0.0, persistence_s=0.0), alpha=1.0)
+    scene = alone(hysteresis=HysteresisOptions(0.0, 0.0, 0.0), alpha=1.0)
     assert "split" in drifts(scene, 0.0)
     assert "merge" in drifts(scene, 0.9)
 

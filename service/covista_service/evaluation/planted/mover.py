@@ -8,14 +8,14 @@ What the criterion says of the true overlaps tells which changes are the mover's
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.distance import pdist, squareform
 
 from covista_service.drawing import timeline
 from covista_service.grouping.continuity import Grouping, follow
-from covista_service.grouping.hysteresis import HysteresisOptions, Pending, weigh
+from covista_service.grouping.hysteresis import HysteresisOptions, Pending, held, weigh
 from covista_service.grouping.k_means import Labels
 from covista_service.grouping.selection import SelectionOptions, choose, contributions
 from covista_service.grouping.similarity import Floats, matrix
@@ -78,15 +78,17 @@ class Row:
 
 
 _DEFAULT = HysteresisOptions()
-_GAIN_ALONE = HysteresisOptions(_DEFAULT.gain, np.inf)
-_PERSISTENCE_ALONE = HysteresisOptions(np.inf, _DEFAULT.persistence_s)
+_HELD = replace(_DEFAULT, persistence_s=0.0)
+_CLEAR = replace(_DEFAULT, gain=0.0, persistence_s=np.inf)
+_PERSISTENT = replace(_DEFAULT, gain=0.0, clear=np.inf)
 SETTINGS = tuple(
     Setting(name + (", smoothed" if smoothed else ""), options, smoothed)
     for smoothed in (False, True)
     for name, options in {
         "as proposed": None,
-        "clear gain": _GAIN_ALONE,
-        "persistence": _PERSISTENCE_ALONE,
+        "held": _HELD,
+        "clear gain": _CLEAR,
+        "persistence": _PERSISTENT,
         "hysteresis": _DEFAULT,
     }.items()
 )
@@ -130,9 +132,11 @@ def labels_over_time(
     for t in range(len(numbers)):
         S = matrix(distance_m[t], overlap[t], ALPHA, "shared")
         # Compared with nothing, what is proposed is shown.
-        held = {} if hysteresis is None else shown
+        against = {} if hysteresis is None else shown
+        if hysteresis is not None and shown:
+            S = held(S, before, hysteresis.gain)
         proposed, score_of = choose(S, options, before).labels, contributions(S, options)
-        standing = weigh(held, robots, proposed, score_of, t * _STEP_NS, hysteresis or _DEFAULT, pending)
+        standing = weigh(against, robots, proposed, score_of, t * _STEP_NS, hysteresis or _DEFAULT, pending)
         pending = standing.pending
         following = follow(shown, standing.clusters, next_label)
         shown, next_label = following.groups, following.next_label

@@ -80,7 +80,7 @@ def test_hysteresis_changes_less_than_what_is_proposed_and_freezes_nobody() -> N
 
 
 def test_a_change_that_never_comes_lags_until_the_mover_leaves_again() -> None:
-    frozen = Setting("frozen", HysteresisOptions(np.inf, np.inf), smoothed=False)
+    frozen = Setting("frozen", HysteresisOptions(persistence_s=np.inf, clear=np.inf), smoothed=False)
     (row,) = mover.rows(GAIN, (10,), 2, (frozen,))
     assert row.changes_per_100 == 0
     assert row.lag_steps > 20
