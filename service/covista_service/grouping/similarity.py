@@ -82,8 +82,9 @@ def similarity(mutual: Floats, squared_m2: Floats, alpha: float, sigma_m: float)
     """s_ij = alpha (q_ij + q_ji)/2 + (1 - alpha) d_ij, Eq. 16, with s_ii = 1.
 
     From mutual overlaps (N, N) and squared distances (N, N), m^2. An unknown overlap (NaN) is not zero overlap: it is
-    what the best chain over one other robot passes on, max over k of the product of the mutual overlaps. Where of
-    nobody both are known, distance alone speaks.
+    what the best chain over a third robot passes on, the product of the two mutual overlaps that are known, of which
+    one at least is more than a quarter: who sees nothing of what a companion of mine sees will see little of mine.
+    Where there is no such link, distance alone speaks.
     """
     S = np.empty_like(squared_m2)
     _mix(squared_m2, mutual, alpha, sigma_m**2, S)
@@ -105,17 +106,20 @@ def _companions(squared_m2: Floats, mutual: Floats) -> tuple[Floats, Floats]:
     count = len(squared_m2)
     partners, found, nearest = np.empty(_PARTNERS * count), 0, np.empty(count)
     for i in range(count):
-        first, second, one, other, near = _SHARED, _SHARED, -1, -1, -1
+        first, second, one, other, near, least = _SHARED, _SHARED, -1, -1, -1, np.inf
         for j in range(count):
             if j == i:
                 continue
-            if near < 0 or squared_m2[i, j] < squared_m2[i, near]:
-                near = j
-            # False where unknown. Of equals the nearer counts, whatever their order.
-            q = mutual[i, j]
-            if q > first or (q == first and one >= 0 and squared_m2[i, j] < squared_m2[i, one]):
+            square, q = squared_m2[i, j], mutual[i, j]
+            if square < least:
+                near, least = j, square
+            # So it is with nearly all, and where the overlap is unknown.
+            if not q >= second:
+                continue
+            # Of equals the nearer counts, whatever their order.
+            if q > first or (q == first and one >= 0 and square < squared_m2[i, one]):
                 second, other, first, one = first, one, q, j
-            elif q > second or (q == second and other >= 0 and squared_m2[i, j] < squared_m2[i, other]):
+            elif q > second or (other >= 0 and square < squared_m2[i, other]):
                 second, other = q, j
         for partner in (one, other):
             if partner >= 0:
@@ -148,39 +152,47 @@ def _mix(squared_m2: Floats, mutual: Floats, alpha: float, sigma2_m2: float, S: 
 @compiled
 def _chain(mutual: Floats, alpha: float, S: Floats) -> None:
     """Where the overlap is unknown S holds d_ij: mix in what the best link passes on, where there is one."""
-    count = len(mutual)
-    for i in range(count):
-        if not np.isnan(mutual[i, :i]).any():
-            continue
-        links = _links(mutual[i], i)
+    begin, links = _links(mutual)
+    for i in range(len(mutual)):
         for j in range(i):
             if np.isnan(mutual[i, j]):
-                best = 0.0
-                for k in links:
-                    # The rest passes on less, for nobody shares more than everything.
-                    if mutual[i, k] <= best:
-                        break
-                    q = mutual[i, k] * mutual[j, k] if k != j else 0.0
-                    if q > best:
-                        best = q
-                if best > 0 or _linked(mutual[i], mutual[j], i, j):
-                    S[i, j] = alpha * best + (1 - alpha) * S[i, j]
-                    S[j, i] = S[i, j]
+                best = _passed_on(mutual, i, j, links[begin[i] : begin[i + 1]], -1.0)
+                best = _passed_on(mutual, j, i, links[begin[j] : begin[j + 1]], best)
+                if best >= 0:
+                    S[i, j] = S[j, i] = alpha * best + (1 - alpha) * S[i, j]
 
 
 @compiled
-def _links(mutual: Floats, i: int) -> NDArray[np.int64]:
-    """With whom a robot i sees something in common, the most first, by its mutual overlaps (N,)."""
-    found = np.flatnonzero(mutual > 0)
-    found = found[found != i]
-    ordered: NDArray[np.int64] = found[np.argsort(-mutual[found], kind="mergesort")]
-    return ordered
+def _passed_on(mutual: Floats, i: int, j: int, links: NDArray[np.int64], best: float) -> float:
+    """The best that links of robot i, the best first, pass on to robot j; `best` if none passes on more."""
+    for k in links:
+        # The rest passes on less, for nobody shares more than everything.
+        if mutual[i, k] <= best:
+            break
+        # False where the second step is unknown.
+        if mutual[i, k] * mutual[j, k] > best:
+            best = mutual[i, k] * mutual[j, k]
+    return best
 
 
 @compiled
-def _linked(one: Floats, other: Floats, i: int, j: int) -> bool:
-    """Is there a robot whose overlaps with both are known, so that a chain that passes on nothing says something?"""
-    k = 0
-    while k < len(one) and (k in (i, j) or np.isnan(one[k] + other[k])):
-        k += 1
-    return k < len(one)
+def _links(mutual: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """With whom robots share enough, the most first: `links[begin[i]:begin[i + 1]]` of robot i."""
+    count = len(mutual)
+    begin = np.zeros(count + 1, np.int64)
+    for i in range(count):
+        found = 0
+        for j in range(count):
+            found += mutual[i, j] > _SHARED
+        # Not itself.
+        begin[i + 1] = begin[i] + found - (mutual[i, i] > _SHARED)
+    links = np.empty(begin[count], np.int64)
+    for i in range(count):
+        found = begin[i]
+        for j in range(count):
+            if j != i and mutual[i, j] > _SHARED:
+                links[found] = j
+                found += 1
+        own = links[begin[i] : begin[i + 1]]
+        own[:] = own[np.argsort(-mutual[i][own], kind="mergesort")]
+    return begin, links
