@@ -22,28 +22,30 @@ def merge_down(S: Floats, expected: Floats, labels: Labels, least: int) -> tuple
     """
     m = labels.max() + 1
     between = _between(S, expected, labels, m)
-    # With whom a group would merge best, among those with a smaller number.
-    partner = np.zeros(m, np.intp)
+    # With whom a group would merge best, among those with a smaller number, and what that would gain.
+    partner, value = np.zeros(m, np.intp), np.full(m, -np.inf)
     for a in range(1, m):
         partner[a] = between[a, :a].argmax()
-    alive = np.ones(m, np.bool_)
+        value[a] = between[a, partner[a]]
     steps, gains = np.empty((m - least, 2), np.intp), np.empty(m - least)
+    alive = np.ones(m, np.bool_)
     for step in range(m - least):
         b = -1
         for a in range(1, m):
-            if alive[a] and (b < 0 or between[a, partner[a]] > between[b, partner[b]] + _LEAST):
+            if alive[a] and (b < 0 or value[a] > value[b] + _LEAST):
                 b = a
         a = partner[b]
-        steps[step, 0], steps[step, 1], gains[step] = a, b, between[b, a]
+        steps[step, 0], steps[step, 1], gains[step] = a, b, value[b]
         alive[b] = False
         for j in range(m):
             between[a, j] += between[b, j]
             between[j, a] = between[a, j]
-            between[j, b] = between[b, j] = -np.inf
+            between[j, b] = -np.inf
         between[a, a] = -np.inf
         for j in range(1, m):
-            if alive[j] and (j == a or partner[j] == a or partner[j] == b or between[j, partner[j]] < between[j, a]):
+            if alive[j] and (j == a or partner[j] == a or partner[j] == b or value[j] < between[a, j]):
                 partner[j] = between[j, :j].argmax()
+                value[j] = between[j, partner[j]]
     return steps, gains
 
 
@@ -88,56 +90,69 @@ def silhouettes(S: Floats, labels: Labels, steps: NDArray[np.intp], stranger: fl
     After a step only robots are looked at anew whose own group or next best group has changed.
     """
     count, m = len(S), labels.max() + 1
-    own, size, alive = labels.copy(), np.zeros(m), np.ones(m, np.bool_)
-    sums = np.zeros((count, m))
+    own, size = labels.copy(), np.zeros(m)
     for i in range(count):
         size[own[i]] += 1
-        for j in range(count):
-            if j != i:
-                sums[i, own[j]] += S[i, j]
-    other, value = np.full(count, -1, np.intp), np.zeros(count)
+    sums = _sums(S, own, m)
+    # The groups that are left, in order.
+    left = np.arange(m)
+    # The next best group, what robots have in common with it on average, and what they contribute.
+    other, most, value = np.full(count, -1, np.intp), np.full(count, -np.inf), np.zeros(count)
     for i in range(count):
-        _next_best(sums[i], own[i], size, alive, i, other)
-        value[i] = _silhouette(sums[i], own[i], other[i], size, stranger)
+        _next_best(sums, own, size, left, i, other, most)
+        value[i] = _silhouette(sums[i, own[i]], most[i], size[own[i]], stranger)
     told = np.empty(len(steps) + 1)
     told[0] = value.mean()
     for step in range(len(steps)):
         a, b = steps[step]
-        alive[b] = False
+        left = left[left != b]
         size[a] += size[b]
         for i in range(count):
             sums[i, a] += sums[i, b]
             if own[i] == b:
                 own[i] = a
             if own[i] == a or other[i] == a or other[i] == b:
-                _next_best(sums[i], own[i], size, alive, i, other)
-            elif sums[i, a] / size[a] > sums[i, other[i]] / size[other[i]]:
-                other[i] = a
+                _next_best(sums, own, size, left, i, other, most)
+            elif sums[i, a] > most[i] * size[a]:
+                other[i], most[i] = a, sums[i, a] / size[a]
             else:
                 continue
-            value[i] = _silhouette(sums[i], own[i], other[i], size, stranger)
+            value[i] = _silhouette(sums[i, own[i]], most[i], size[own[i]], stranger)
         told[step + 1] = value.mean()
     return told
 
 
 @compiled
-def _next_best(sums: Floats, own: int, size: Floats, alive: NDArray[np.bool_], i: int, other: Labels) -> None:
-    """Enter the group, other than its own, that robot i has most in common with; -1 if there is none."""
-    best, most = -1, -np.inf
-    for group in range(len(size)):
-        if alive[group] and group != own:
-            mean = sums[group] / size[group]
-            if mean > most:
-                best, most = group, mean
-    other[i] = best
+def _sums(S: Floats, labels: Labels, m: int) -> Floats:
+    """What robots have in common with all of a group, themselves left out: (N, m)."""
+    count = len(S)
+    sums = np.zeros((count, m))
+    for i in range(count):
+        for j in range(count):
+            if j != i:
+                sums[i, labels[j]] += S[i, j]
+    return sums
 
 
 @compiled
-def _silhouette(sums: Floats, own: int, other: int, size: Floats, stranger: float) -> float:
-    alone = size[own] == 1
-    a = stranger if alone else sums[own] / (size[own] - 1)
-    b = 0.0 if other < 0 else sums[other] / size[other]
-    if not alone:
-        b = max(b, stranger)
+def _next_best(
+    sums: Floats, own: Labels, size: Floats, left: NDArray[np.intp], i: int, other: Labels, most: Floats
+) -> None:
+    """Enter the group, other than its own, that robot i has most in common with; -1 if there is none."""
+    best, highest = -1, -np.inf
+    for group in left:
+        if group != own[i]:
+            mean = sums[i, group] / size[group]
+            if mean > highest:
+                best, highest = group, mean
+    other[i], most[i] = best, highest
+
+
+@compiled
+def _silhouette(own: float, most: float, size: float, stranger: float) -> float:
+    """From the sum over the own group of `size` robots and the highest mean over another, -inf if there is none."""
+    alone = size == 1
+    a = stranger if alone else own / (size - 1)
+    b = max(most, 0.0 if alone else stranger)
     room = 1 - min(a, b)
     return (a - b) / room if room > 1e-12 else 0.0

@@ -15,6 +15,8 @@ from covista_service.grouping.similarity import Floats
 # A gain below this is rounding.
 _LEAST = 1e-9
 _ROUNDS = 50
+# Room for so many friends of each robot, to begin with.
+_FEW = 8
 
 
 @compiled
@@ -42,24 +44,18 @@ def settle(S: Floats, expected: Floats, start: Labels) -> Labels:
 @compiled
 def _friends(S: Floats, expected: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Whose company exceeds expectations: robots `friends[begin[i]:begin[i + 1]]` of robot i."""
-    count = len(S)
-    begin = np.zeros(count + 1, np.intp)
+    count, found = len(S), 0
+    begin, friends = np.zeros(count + 1, np.intp), np.empty(_FEW * count, np.intp)
     for i in range(count):
-        own, found = expected[i], 0
+        if found + count > len(friends):
+            friends = np.concatenate((friends, np.empty(len(friends), np.intp)))
+        own = expected[i]
         for j in range(count):
-            found += 2 * S[i, j] > own + expected[j]
-        # Not itself.
-        begin[i + 1] = begin[i] + found - (2 * S[i, i] > 2 * own)
-    friends = np.empty(begin[count], np.intp)
-    for i in range(count):
-        found, last = begin[i], begin[i + 1]
-        for j in range(count):
-            if found == last:
-                break
-            if j != i and 2 * S[i, j] > expected[i] + expected[j]:
+            if 2 * S[i, j] > own + expected[j] and j != i:
                 friends[found] = j
                 found += 1
-    return begin, friends
+        begin[i + 1] = found
+    return begin, friends[:found]
 
 
 @compiled

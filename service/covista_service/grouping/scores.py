@@ -56,12 +56,23 @@ def silhouette(S: Floats, labels: Labels, stranger: float) -> Floats:
     return result
 
 
-@compiled
 def expectations(S: Floats, stranger: float, demand: float) -> Floats:
     """What each robot may expect of a companion (N,): a share `demand` of the mean of its two largest similarities.
 
     And not less than the outsider's similarity.
     """
+    return expected_of(best_company(S), stranger, demand)
+
+
+def expected_of(company: Floats, stranger: float, demand: float) -> Floats:
+    """The same from `best_company` (N,), which is what takes time."""
+    result: Floats = np.maximum(demand * company, stranger)
+    return result
+
+
+@compiled
+def best_company(S: Floats) -> Floats:
+    """The mean of the two largest similarities of each robot to others (N,); -inf for a robot without others."""
     count = len(S)
     result = np.empty(count)
     for i in range(count):
@@ -73,8 +84,7 @@ def expectations(S: Floats, stranger: float, demand: float) -> Floats:
                     first, second = s, first
                 elif s > second:
                     second = s
-        best = first if second == -np.inf else (first + second) / 2
-        result[i] = max(demand * best, stranger)
+        result[i] = first if second == -np.inf else (first + second) / 2
     return result
 
 
@@ -83,10 +93,17 @@ def gain(S: Floats, labels: Labels, expected: Floats) -> Floats:
     """Half of what pairs inside groups exceed expectations (N,) by: sum over mates of s_ij - (e_i + e_j)/2."""
     count = len(S)
     result = np.zeros(count)
-    for i in range(count):
-        for j in range(count):
-            if j != i and labels[j] == labels[i]:
-                result[i] += (S[i, j] - (expected[i] + expected[j]) / 2) / 2
+    # Groups one after the other, so that nobody looks far for its mates.
+    order = np.argsort(labels, kind="mergesort")
+    begin = 0
+    for end in range(1, count + 1):
+        if end < count and labels[order[end]] == labels[order[begin]]:
+            continue
+        for i in order[begin:end]:
+            for j in order[begin:end]:
+                if j != i:
+                    result[i] += (S[i, j] - (expected[i] + expected[j]) / 2) / 2
+        begin = end
     return result
 
 

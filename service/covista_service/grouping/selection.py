@@ -38,6 +38,8 @@ _SPREAD = 1.25
 _TIE = 1e-9
 # Down from the number that gain finds, scores of so many are told.
 _TOLD_SHARE = 0.5
+# Rows and columns that are checked together.
+_BLOCK = 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,20 +125,28 @@ def contributions(S: Floats, options: SelectionOptions) -> Contributions:
 def _check(S: Floats) -> None:
     if S.ndim != 2 or S.shape[0] != S.shape[1]:
         raise ValueError(f"a similarity matrix is square, not {S.shape}")
-    if not np.isfinite(S.sum()):
+    if _sound(S):
+        return
+    if not np.isfinite(S).all():
         i, j = np.argwhere(~np.isfinite(S))[0].tolist()
         raise ValueError(f"similarities are finite, that of rows {i} and {j} is {S[i, j]}")
-    if not _sound(S):
-        raise ValueError("a similarity matrix is symmetric, lies from 0 to 1, and is 1 on its diagonal")
+    raise ValueError("a similarity matrix is symmetric, lies from 0 to 1, and is 1 on its diagonal")
 
 
 @compiled
 def _sound(S: Floats) -> bool:
-    for i in range(len(S)):
+    count = len(S)
+    for i in range(count):
         if S[i, i] != 1:
             return False
-        for j in range(i):
-            if S[i, j] != S[j, i] or not 0 <= S[i, j] <= 1:
+    # Block by block, so that the mirror image is read line by line too.
+    for top in range(0, count, _BLOCK):
+        for left in range(0, top + 1, _BLOCK):
+            sound = True
+            for i in range(top, min(top + _BLOCK, count)):
+                for j in range(left, min(left + _BLOCK, i)):
+                    sound &= (S[i, j] == S[j, i]) & (S[i, j] >= 0) & (S[i, j] <= 1)
+            if not sound:
                 return False
     return True
 
@@ -147,9 +157,10 @@ def _adaptive(S: Floats, options: SelectionOptions, numbers: range) -> Choice:
     In swarms that are not too large all that come of merging robots one by one, down to the fine groups, are looked at
     too.
     """
-    fine = moves.settle(S, scores.expectations(S, options.stranger, FINE), np.arange(len(S)))
+    company = scores.best_company(S)
+    fine = moves.settle(S, scores.expected_of(company, options.stranger, FINE), np.arange(len(S)))
     formed = int(fine.max()) + 1
-    expected = scores.expectations(S, options.stranger, MERGE)
+    expected = scores.expected_of(company, options.stranger, MERGE)
     if len(S) <= ONE_BY_ONE_UP_TO:
         ladders = [_Ladder.of(S, expected, np.arange(len(S)), formed + 1)] if formed < len(S) else []
     elif formed < numbers.start:
