@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -98,13 +99,15 @@ class Affinity:
         for q in (q_a, q_b):
             if q is not None and not 0 <= q <= 1:
                 raise ValueError(f"a share lies from 0 to 1, that of {a} and {b} does not: {q}")
-        self._overlap[i, j] = np.nan if q_a is None else q_a
-        self._overlap[j, i] = np.nan if q_b is None else q_b
-        mutual = (self._overlap[i, j] + self._overlap[j, i]) / 2
-        held = self._mutual[i, j]
-        # NaN in the one or the other: there is nothing to smooth.
-        smoothed = held + self.smoothing * (mutual - held)
-        self._mutual[i, j] = self._mutual[j, i] = mutual if np.isnan(smoothed) or self.smoothing == 1 else smoothed
+        # Numbers of Python's own: an array's cost three times as much here.
+        seen, seeing = (math.nan if q is None else float(q) for q in (q_a, q_b))
+        self._overlap[i, j], self._overlap[j, i] = seen, seeing
+        mutual = (seen + seeing) / 2
+        if self.smoothing != 1:
+            smoothed = self._mutual.item(i, j) + self.smoothing * (mutual - self._mutual.item(i, j))
+            # NaN in the one or the other: there is nothing to smooth.
+            mutual = mutual if math.isnan(smoothed) else smoothed
+        self._mutual[i, j] = self._mutual[j, i] = mutual
 
     @property
     def squared_m2(self) -> Floats:
