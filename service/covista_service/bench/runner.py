@@ -5,7 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import chain
 
-from covista_service.bench import dense, latency, planes, predict_planes, predict_surfaces, surface, survey
+from covista_service.bench import (
+    dense,
+    group,
+    group_costs,
+    latency,
+    planes,
+    predict_planes,
+    predict_surfaces,
+    surface,
+    survey,
+)
 from covista_service.bench.row import Row
 
 Bench = Callable[[bool], Iterator[Row]]
@@ -14,6 +24,7 @@ BENCHES: Mapping[str, Sequence[Bench]] = {
     "survey": (survey.rows, surface.rows, dense.rows),
     "planes": (planes.rows,),
     "predict": (predict_planes.rows, predict_surfaces.rows),
+    "group": (group.rows, group_costs.rows),
     "latency": (latency.rows,),
 }
 
