@@ -1,88 +1,270 @@
 """Whatever happens, the matrices kept row by row are those computed from scratch."""
 
 import math
+from itertools import count as numbers
 
 import numpy as np
 import pytest
-from covista_service.grouping.affinity import Affinity
-from covista_service.grouping.similarity import sigma_m
-from hypothesis import settings
+from covista_service.grouping.affinity import FARTHEST_M, Affinity
+from hypothesis import given, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
-from scipy.spatial.distance import pdist, squareform
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-NAMES = [f"r{number}" for number in range(24)]
-coordinates = st.floats(-1e3, 1e3, allow_nan=False) | st.integers(-3, 3).map(float)
+from tests.service.grouping.swarms import Floats, distances
+
+# More than a block of sums, and more than two doublings of the first room.
+CROWD = 48
+SIGMAS = ("shared", "std", 2.5)
+# Below it a robot stands where the other stands, as far as squares can tell.
+TINY_M = 1e-100
+coordinates = st.floats(-1e3, 1e3) | st.integers(-2, 2).map(float) | st.floats(1e-12, 1e-9)
 positions = st.tuples(coordinates, coordinates, coordinates)
-shares = st.floats(0, 1) | st.none()
+shares = st.floats(0, 1) | st.sampled_from([0.0, 0.25, 0.5, 1.0])
+picks = st.integers(0, 10_000)
+Pair = tuple[str, str]
 
 
-def batch(position_m: dict[str, tuple[float, ...]], overlaps: dict[tuple[str, str], float | None], alpha: float):
-    """Eqs. 15 and 16, robot by robot."""
-    robots = sorted(position_m)
-    distances = pdist(np.array([position_m[robot] for robot in robots]).reshape(-1, 3))
-    distance_m = squareform(distances) if len(robots) > 1 else np.zeros((len(robots), len(robots)))
-    sigma = 1.0
-    if len(distances) and distances.mean() > 0:
-        sigma = distances.std() if distances.std() > 1e-9 * distances.mean() else distances.mean()
-    S = np.eye(len(robots))
-    for i, a in enumerate(robots):
-        for j, b in enumerate(robots):
-            if i != j:
-                near = math.exp(-((distance_m[i, j] / sigma) ** 2))
-                q_a, q_b = overlaps.get((a, b)), overlaps.get((b, a))
-                known = q_a is not None and q_b is not None
-                S[i, j] = alpha * (q_a + q_b) / 2 + (1 - alpha) * near if known else near
-    return S, distance_m
+def mean_and_spread(distance_m: Floats) -> tuple[float, float]:
+    apart_m = distance_m[np.triu_indices(len(distance_m), 1)]
+    return (float(apart_m.mean()), float(apart_m.std())) if len(apart_m) else (0.0, 0.0)
+
+
+def standard(distance_m: Floats) -> float:
+    mean, spread = mean_and_spread(distance_m)
+    if mean == 0:
+        return 1.0
+    return spread if spread > 1e-6 * mean else mean
+
+
+def shared(distance_m: Floats, mutual: Floats) -> float:
+    """Three times the median distance to the two that each has most in common with, of more than a quarter."""
+    count = len(distance_m)
+    if count < 2:
+        return 1.0
+    partners_m: list[float] = []
+    nearest_m: list[float] = []
+    for i in range(count):
+        q, apart_m = np.delete(mutual[i], i), np.delete(distance_m[i], i)
+        # Of those who share as much the nearer; of those as near whoever is not known to share little.
+        order = np.lexsort((apart_m, -q))[:2]
+        partners_m += apart_m[order[q[order] > 0.25]].tolist()
+        nearest = apart_m.min()
+        nearest_m.append(nearest / 2 if (q[apart_m <= nearest * (1 + 1e-9)] <= 0.25).all() else nearest)
+    sigma = 3 * float(np.median(partners_m)) if len(partners_m) >= count / 2 else float(np.median(nearest_m))
+    return sigma or float(distance_m.mean()) or 1.0
+
+
+def chained(mutual: Floats) -> Floats:
+    """What is unknown, by the best chain over one other robot; NaN where there is none, or nothing passes."""
+    known = np.nan_to_num(mutual, nan=0.0)
+    np.fill_diagonal(known, 0.0)
+    result = mutual.copy()
+    for i, own in enumerate(known):
+        best = (own[:, None] * known).max(axis=0)
+        unknown = np.isnan(mutual[i])
+        result[i, unknown] = np.where(best > 0, best, np.nan)[unknown]
+    return result
+
+
+def mixed(q: Floats, near: Floats, alpha: float) -> Floats:
+    """Eq. 16, where nobody knows by distance alone."""
+    S = np.where(np.isnan(q), near, alpha * q + (1 - alpha) * near)
+    np.fill_diagonal(S, 1.0)
+    return S
+
+
+def off(found: Floats, expected: Floats) -> float:
+    """The largest difference; NaN, which is not small, if one is NaN."""
+    assert found.shape == expected.shape
+    return float(np.abs(found - expected).max(initial=0.0))
 
 
 class Swarm(RuleBasedStateMachine):
     def __init__(self) -> None:
         super().__init__()
-        self.affinity = Affinity()
         self.position_m: dict[str, tuple[float, ...]] = {}
-        self.overlaps: dict[tuple[str, str], float | None] = {}
+        self.shares: dict[Pair, float] = {}
+        self.mutual: dict[Pair, float] = {}
+        self.away: dict[str, dict[Pair, tuple[float | None, float | None]]] = {}
+        self.names = numbers()
 
-    @rule(name=st.sampled_from(NAMES), position_m=positions)
-    def join_or_move(self, name: str, position_m: tuple[float, ...]) -> None:
-        if name in self.affinity:
-            self.affinity.move(name, position_m)
-        else:
-            self.affinity.add(name, position_m)
+    @initialize(smoothing=st.sampled_from([1.0, 0.3]), alpha=st.floats(0, 1))
+    def begin(self, smoothing: float, alpha: float) -> None:
+        self.affinity = Affinity(smoothing)
+        self.alpha = alpha
+
+    def robot(self, pick: int) -> str:
+        return sorted(self.position_m)[pick % len(self.position_m)]
+
+    def enter(self, name: str, position_m: tuple[float, ...]) -> None:
+        self.affinity.add(name, position_m)
         self.position_m[name] = position_m
 
-    @precondition(lambda self: len(self.position_m) > 1)
-    @rule(data=st.data(), q_a=shares, q_b=shares)
-    def see(self, data: st.DataObject, q_a: float | None, q_b: float | None) -> None:
-        a, b = data.draw(st.lists(st.sampled_from(sorted(self.position_m)), min_size=2, max_size=2, unique=True))
+    def tell(self, a: str, b: str, q_a: float | None, q_b: float | None) -> None:
+        """What the matrix is told, and what should come of it."""
         self.affinity.see(a, b, q_a, q_b)
-        self.overlaps[a, b], self.overlaps[b, a] = q_a, q_b
+        for pair, q in (((a, b), q_a), ((b, a), q_b)):
+            self.shares.pop(pair, None)
+            if q is not None:
+                self.shares[pair] = q
+        pair = min(a, b), max(a, b)
+        held = self.mutual.pop(pair, None)
+        if q_a is not None and q_b is not None:
+            newest = (q_a + q_b) / 2
+            # The very same arithmetic, for a quarter is a threshold.
+            smooth = held is not None and self.affinity.smoothing != 1
+            self.mutual[pair] = held + self.affinity.smoothing * (newest - held) if smooth else newest
+
+    @precondition(lambda self: len(self.position_m) < CROWD)
+    @rule(pick=picks, position_m=positions)
+    def join(self, pick: int, position_m: tuple[float, ...]) -> None:
+        # Names sort otherwise than they come.
+        self.enter(f"{pick % 7}-{next(self.names)}", position_m)
+
+    @precondition(lambda self: len(self.position_m) < CROWD - 12)
+    @rule(pick=picks, centre_m=positions, sharing=st.booleans())
+    def a_troop_joins(self, pick: int, centre_m: tuple[float, ...], sharing: bool) -> None:
+        rng = np.random.default_rng(pick)
+        troop = [f"{pick % 5}-{next(self.names)}" for _ in range(rng.integers(2, 12))]
+        for name in troop:
+            self.enter(name, tuple((np.array(centre_m) + rng.normal(0, 2, 3)).tolist()))
+        if sharing:
+            for a, b in zip(troop, troop[1:], strict=False):
+                self.tell(a, b, *rng.uniform(0, 1, 2).tolist())
 
     @precondition(lambda self: self.position_m)
-    @rule(data=st.data())
-    def leave(self, data: st.DataObject) -> None:
-        name = data.draw(st.sampled_from(sorted(self.position_m)))
-        self.affinity.remove(name)
-        del self.position_m[name]
-        self.overlaps = {pair: q for pair, q in self.overlaps.items() if name not in pair}
+    @rule(pick=picks, position_m=positions)
+    def move(self, pick: int, position_m: tuple[float, ...]) -> None:
+        robot = self.robot(pick)
+        self.affinity.move(robot, position_m)
+        self.position_m[robot] = position_m
+
+    @precondition(lambda self: len(self.position_m) > 1)
+    @rule(pick=picks, other=picks)
+    def meet(self, pick: int, other: int) -> None:
+        a, b = self.robot(pick), self.robot(other)
+        self.affinity.move(a, self.position_m[b])
+        self.position_m[a] = self.position_m[b]
+
+    @precondition(lambda self: len(self.position_m) > 1)
+    @rule(pick=picks, step=picks, q_a=shares | st.none(), q_b=shares | st.none())
+    def see(self, pick: int, step: int, q_a: float | None, q_b: float | None) -> None:
+        a, b = self.robot(pick), self.robot(pick + 1 + step % (len(self.position_m) - 1))
+        self.tell(a, b, q_a, q_b)
+
+    @precondition(lambda self: len(self.position_m) > 1)
+    @rule(pick=picks, q=shares)
+    def see_around(self, pick: int, q: float) -> None:
+        robots, rng = sorted(self.position_m), np.random.default_rng(pick)
+        a = self.robot(pick)
+        for b in rng.permutation(robots)[:5].tolist():
+            if b != a:
+                self.tell(a, b, q, float(rng.uniform()))
+
+    @precondition(lambda self: self.position_m)
+    @rule(pick=picks)
+    def go_stale(self, pick: int) -> None:
+        robot = self.robot(pick)
+        for other in self.position_m.keys() - {robot}:
+            self.tell(robot, other, None, None)
+
+    @precondition(lambda self: self.position_m)
+    @rule(pick=picks)
+    def leave(self, pick: int) -> None:
+        robot = self.robot(pick)
+        self.affinity.remove(robot)
+        del self.position_m[robot]
+        told = {pair for pair in self.shares if robot in pair}
+        self.away[robot] = {(a, b): (self.shares.get((a, b)), self.shares.get((b, a))) for a, b in told}
+        for pair in told:
+            del self.shares[pair]
+        for pair in [pair for pair in self.mutual if robot in pair]:
+            del self.mutual[pair]
+
+    @precondition(lambda self: self.away and len(self.position_m) < CROWD)
+    @rule(pick=picks, position_m=positions)
+    def come_back(self, pick: int, position_m: tuple[float, ...]) -> None:
+        robot = sorted(self.away)[pick % len(self.away)]
+        self.enter(robot, position_m)
+        for (a, b), (q_a, q_b) in self.away.pop(robot).items():
+            if a in self.position_m and b in self.position_m:
+                self.tell(a, b, q_a, q_b)
 
     @invariant()
     def equals_the_batch(self) -> None:
-        S, distance_m = batch(self.position_m, self.overlaps, 0.4)
-        assert self.affinity.robots == tuple(sorted(self.position_m))
-        np.testing.assert_allclose(self.affinity.distance_m, distance_m, rtol=0, atol=1e-12 * 1e3)
-        np.testing.assert_allclose(self.affinity.similarity(0.4), S, rtol=0, atol=1e-12)
+        robots = sorted(self.position_m)
+        assert self.affinity.robots == tuple(robots)
+        place = {robot: row for row, robot in enumerate(robots)}
+        overlap, mutual = np.full((2, len(robots), len(robots)), np.nan)
+        for (a, b), q in self.shares.items():
+            overlap[place[a], place[b]] = q
+        for (a, b), q in self.mutual.items():
+            mutual[place[a], place[b]] = mutual[place[b], place[a]] = q
+        np.fill_diagonal(overlap, 1.0)
+        np.fill_diagonal(mutual, 1.0)
+        np.testing.assert_array_equal(self.affinity.overlap, overlap)
+        np.testing.assert_allclose(self.affinity.mutual, mutual, rtol=0, atol=1e-12)
+        distance_m = distances(np.array([self.position_m[robot] for robot in robots]).reshape(-1, 3))
+        np.testing.assert_allclose(self.affinity.distance_m, distance_m, rtol=1e-12, atol=0)
+        self._equals_by_range(distance_m, mutual)
+
+    def _equals_by_range(self, distance_m: Floats, mutual: Floats) -> None:
+        mean, spread = mean_and_spread(distance_m)
+        q = chained(mutual)
+        for sigma, expected in (("shared", shared(distance_m, mutual)), ("std", standard(distance_m)), (2.5, 2.5)):
+            # Where distances are next to equal, their spread is a matter of digits, and Eq. 15 is 0.
+            if sigma != "std" or spread == 0 or spread > 1e-3 * mean:
+                assert self.affinity.sigma_m(sigma) == pytest.approx(expected, rel=1e-9)
+            near = np.exp(-np.square(distance_m / max(expected, TINY_M)))
+            assert off(self.affinity.closeness(sigma), near) <= 1e-12
+            for alpha in (0.0, self.alpha, 1.0):
+                assert off(self.affinity.similarity(alpha, sigma), mixed(q, near, alpha)) <= 1e-12
 
 
 TestSwarm = Swarm.TestCase
-TestSwarm.settings = settings(max_examples=60, stateful_step_count=50, deadline=None)
+TestSwarm.settings = settings(max_examples=8, stateful_step_count=200, deadline=None)
 
 
-def row(*along_m: float) -> Affinity:
-    affinity = Affinity()
+def row(*along_m: float, smoothing: float = 1.0) -> Affinity:
+    affinity = Affinity(smoothing)
     for number, x in enumerate(along_m):
         affinity.add(f"r{number}", (x, 0, 0))
     return affinity
+
+
+@given(smoothing=st.floats(0.05, 1), told=st.lists(st.tuples(shares, shares) | st.none(), max_size=12))
+def test_mutual_overlap_is_the_exponential_average_of_what_was_told_since_it_was_unknown(
+    smoothing: float, told: list[tuple[float, float] | None]
+) -> None:
+    affinity = row(0, 1, smoothing=smoothing)
+    since: list[float] = []
+    for pair in told:
+        affinity.see("r1", "r0", *(pair or (None, 0.5)))
+        since = [*since, sum(pair) / 2] if pair else []
+    if since:
+        weights = smoothing * (1 - smoothing) ** np.arange(len(since))[::-1]
+        weights[0] = (1 - smoothing) ** (len(since) - 1)
+        assert affinity.mutual[0, 1] == pytest.approx(weights @ since, abs=1e-12)
+        assert 0 <= affinity.mutual[0, 1] <= 1
+    else:
+        assert np.isnan(affinity.mutual[0, 1])
+
+
+def test_without_smoothing_the_newest_stands() -> None:
+    affinity = row(0, 1)
+    for q in (0.1, 0.7, 0.3):
+        affinity.see("r0", "r1", q, q)
+    assert affinity.mutual[0, 1] == 0.3
+
+
+def test_who_comes_back_is_not_averaged_with_what_was_before() -> None:
+    affinity = row(0, 1, smoothing=0.1)
+    affinity.see("r0", "r1", 1.0, 1.0)
+    affinity.remove("r1")
+    affinity.add("r1", (1, 0, 0))
+    assert np.isnan(affinity.mutual[0, 1])
+    affinity.see("r0", "r1", 0.2, 0.2)
+    assert affinity.mutual[0, 1] == 0.2
 
 
 def test_overlap_has_ones_on_the_diagonal_and_says_where_it_is_unknown() -> None:
@@ -92,39 +274,86 @@ def test_overlap_has_ones_on_the_diagonal_and_says_where_it_is_unknown() -> None
     np.testing.assert_array_equal(affinity.overlap, expected)
 
 
-def test_unknown_overlap_leaves_the_word_to_distance() -> None:
-    affinity = row(0, 1, 3)
-    np.testing.assert_array_equal(affinity.similarity(0.9), affinity.closeness())
-    affinity.see("r0", "r1", 0.0, 0.0)
-    assert affinity.similarity(0.9)[0, 1] == pytest.approx(0.1 * affinity.closeness()[0, 1])
+def test_what_is_read_is_a_copy() -> None:
+    affinity = row(0, 1)
+    affinity.see("r0", "r1", 0.5, 0.5)
+    for name in ("squared_m2", "distance_m", "overlap", "mutual"):
+        getattr(affinity, name)[:] = 7
+        assert not (getattr(affinity, name) == 7).any()
 
 
-def test_all_robots_in_one_place_are_as_close_as_can_be() -> None:
-    np.testing.assert_array_equal(row(2, 2, 2).closeness(), np.ones((3, 3)))
+def test_robots_are_known_by_name() -> None:
+    affinity = row(0, 1)
+    assert "r1" in affinity
+    assert "r2" not in affinity
+    assert len(affinity) == 2
 
 
-def test_equal_distances_are_measured_by_their_mean() -> None:
-    assert row(0, 8).closeness()[0, 1] == pytest.approx(math.exp(-1))
-
-
-def test_a_swarm_that_was_far_apart_can_be_tight_again() -> None:
+@pytest.mark.parametrize("sigma", ["shared", "std"])
+def test_a_swarm_that_was_far_apart_can_be_tight_again(sigma) -> None:
     affinity = row(0, 1e8, 3e8)
     for number, x in enumerate((0.0, 1e-4, 3e-4)):
         affinity.move(f"r{number}", (x, 0, 0))
-    np.testing.assert_allclose(affinity.closeness(), row(0, 1, 3).closeness(), atol=1e-9)
-
-
-def test_sigma_in_metres_is_taken_as_given() -> None:
-    assert row(0, 2).closeness(4.0)[0, 1] == pytest.approx(math.exp(-0.25))
+    np.testing.assert_allclose(affinity.closeness(sigma), row(0, 1, 3).closeness(sigma), atol=1e-12)
 
 
 @pytest.mark.parametrize("count", [0, 1])
-def test_nobody_and_one_alone_have_matrices_too(count: int) -> None:
+@pytest.mark.parametrize("sigma", SIGMAS)
+def test_nobody_and_one_alone_have_matrices_too(count: int, sigma) -> None:
     affinity = row(*range(count))
-    assert affinity.similarity(0.5).shape == (count, count)
-    assert sigma_m(affinity.distance_m, "std") == 1.0
+    for matrix in (affinity.similarity(0.5, sigma), affinity.closeness(sigma), affinity.overlap, affinity.mutual):
+        np.testing.assert_array_equal(matrix, np.ones((count, count)))
+    assert affinity.sigma_m(sigma) == (sigma if isinstance(sigma, float) else 1.0)
+
+
+WRONG_PLACES = [
+    (math.nan, 0, 0),
+    (0, math.inf, 0),
+    (0, 0, -math.inf),
+    (FARTHEST_M, 0, 0),
+    (0, -1e300, 0),
+    (1, 2),
+    (1, 2, 3, 4),
+    1,
+]
+
+
+@pytest.mark.parametrize("place", WRONG_PLACES, ids=str)
+def test_a_position_that_is_none_is_refused_and_changes_nothing(place) -> None:
+    affinity = row(0, 1)
+    before = affinity.squared_m2
+    with pytest.raises(ValueError, match=r"a position is three finite numbers below 1e\+12 m, that of r1 is"):
+        affinity.move("r1", place)
+    with pytest.raises(ValueError, match="that of r7 is"):
+        affinity.add("r7", place)
+    assert affinity.robots == ("r0", "r1")
+    np.testing.assert_array_equal(affinity.squared_m2, before)
+
+
+@pytest.mark.parametrize("q", [-0.001, 1.001, math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("first", [True, False])
+def test_a_share_that_is_none_is_refused_and_changes_nothing(q: float, first: bool) -> None:
+    affinity = row(0, 1)
+    affinity.see("r0", "r1", 0.5, 0.25)
+    with pytest.raises(ValueError, match="a share lies from 0 to 1, that of r0 and r1 does not"):
+        affinity.see("r0", "r1", *((q, 0.5) if first else (0.5, q)))
+    np.testing.assert_array_equal(affinity.overlap, [[1, 0.5], [0.25, 1]])
+
+
+def test_a_robot_and_itself_are_no_pair() -> None:
+    with pytest.raises(ValueError, match="r0 shares all of its view with itself"):
+        row(0).see("r0", "r0", 0.5, 0.5)
 
 
 def test_nobody_joins_twice() -> None:
+    affinity = row(0)
     with pytest.raises(ValueError, match="r0 is there already"):
-        row(0).add("r0", (1, 1, 1))
+        affinity.add("r0", (1, 1, 1))
+    assert len(affinity) == 1
+
+
+def test_the_farthest_that_robots_may_be_is_no_trouble() -> None:
+    almost = 0.999 * FARTHEST_M
+    affinity = row(-almost, almost, 0)
+    for sigma in SIGMAS:
+        assert np.isfinite(affinity.similarity(0.5, sigma)).all()
