@@ -14,6 +14,8 @@ Sigma = Literal["shared", "std"] | float
 # Distances that differ by less than this share of their mean count as equal: below it the difference of the mean
 # square and the squared mean is rounding.
 EQUAL = 1e-6
+# Ranges beyond count as these, so that squares are neither 0 nor infinite.
+_TIGHTEST_M, _WIDEST_M = 1e-100, 1e100
 # Who sees more than this in common with somebody tells how far apart robots of one group stand.
 _SHARED = 0.25
 _PARTNERS = 2
@@ -27,7 +29,8 @@ def sigma_m(distance_m: Floats, mutual: Floats, sigma: Sigma) -> float:
     where all are equal (two robots, an equilateral triangle). It is the size of the arena, so in a large swarm
     everybody is close to everybody. `shared` is 2.5 times the median distance from a robot to the two that it has most
     in common with, of those who share more than a quarter. Where there are fewer than N/2 such partners, it is the
-    median distance to the nearest robot, halved where the two are known to share less. 1 where all distances are 0.
+    median distance to the nearest robot, halved where the two are known to share less. Where that is 0, for most stand
+    in one place, it is the mean of the matrix; 1 where all distances are 0.
     """
     if sigma == "shared":
         return shared_sigma_m(np.square(distance_m), mutual)
@@ -68,7 +71,7 @@ def shared_sigma_m(squared_m2: Floats, mutual: Floats) -> float:
 
 def closeness(distance_m: Floats, sigma_m: float) -> Floats:
     """d_ij = exp(-|r_i - r_j|^2 / sigma^2), Eq. 15, for distances (N, N)."""
-    result: Floats = np.exp(-np.square(distance_m / sigma_m))
+    result: Floats = np.exp(-np.square(distance_m / _within(sigma_m)))
     return result
 
 
@@ -87,7 +90,7 @@ def similarity(mutual: Floats, squared_m2: Floats, alpha: float, sigma_m: float)
     Where there is no such link, distance alone speaks.
     """
     S = np.empty_like(squared_m2)
-    _mix(squared_m2, mutual, alpha, sigma_m**2, S)
+    _mix(squared_m2, mutual, alpha, _within(sigma_m) ** 2, S)
     return S
 
 
@@ -95,6 +98,10 @@ def matrix(distance_m: Floats, overlap: Floats, alpha: float, sigma: Sigma) -> F
     """Eqs. 15 and 16 from distances and overlaps (N, N; row i: share of i's image seen by j; NaN unknown)."""
     mutual = mutual_overlap(overlap)
     return similarity(mutual, np.square(distance_m), alpha, sigma_m(distance_m, mutual, sigma))
+
+
+def _within(sigma_m: float) -> float:
+    return min(max(sigma_m, _TIGHTEST_M), _WIDEST_M)
 
 
 @compiled

@@ -175,7 +175,7 @@ def test_eq_16_mixes_overlap_and_closeness(seed: int, count: int, alpha: float) 
 places_m = st.floats(-1e3, 1e3) | st.sampled_from([0.0, 1.0, 2.0]) | st.floats(-1e-9, 1e-9)
 
 
-@given(data=st.data(), count=counts, alpha=st.floats(0, 1), sigma=st.sampled_from(SIGMAS) | st.floats(1e-3, 1e9))
+@given(data=st.data(), count=counts, alpha=st.floats(0, 1), sigma=st.sampled_from(SIGMAS) | st.floats(1e-300, 1e300))
 @settings(max_examples=300)
 def test_similarities_are_symmetric_from_0_to_1_and_1_on_the_diagonal(data, count: int, alpha: float, sigma) -> None:
     position_m = data.draw(arrays(np.float64, (count, 3), elements=places_m))
@@ -217,6 +217,14 @@ def test_the_scale_of_the_world_does_not_matter(sigma: Sigma, seed: int, count: 
     distance_m = distances(position_m)
     S = matrix(distance_m, overlap, 0.4, sigma)
     np.testing.assert_allclose(matrix(scale * distance_m, overlap, 0.4, sigma), S, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize(("sigma", "near"), [(1e-200, 0.0), (5e-324, 0.0), (1e200, 1.0)])
+def test_a_range_next_to_nothing_and_one_beyond_the_world_are_ranges(sigma: float, near: float) -> None:
+    distance_m = at((0, 0, 0), (0, 0, 0), (5, 0, 0))
+    expected = [[1, 1, near], [1, 1, near], [near, near, 1]]
+    np.testing.assert_array_equal(matrix(distance_m, unknown(3), 0.5, sigma), expected)
+    np.testing.assert_array_equal(closeness(distance_m, sigma), expected)
 
 
 @by_sigma
