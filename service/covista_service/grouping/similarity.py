@@ -20,6 +20,8 @@ _TIGHTEST_M, _WIDEST_M = 1e-100, 1e100
 _SHARED = 0.25
 _PARTNERS = 2
 _REACH = 2.5
+# As near as the nearest, to rounding of squares.
+_AS_NEAR = 1 + 1e-9
 
 
 def sigma_m(distance_m: Floats, mutual: Floats, sigma: Sigma) -> float:
@@ -108,7 +110,7 @@ def _within(sigma_m: float) -> float:
 def _companions(squared_m2: Floats, mutual: Floats) -> tuple[Floats, Floats]:
     """Distances of everybody's two partners, those who share enough; and how far everybody's nearest robot is (N,).
 
-    Half of that if the two are known to share little: so far is too far, then.
+    Half of that if the two are known to share little, whoever of those as near it is: so far is too far, then.
     """
     count = len(squared_m2)
     partners, found, nearest = np.empty(_PARTNERS * count), 0, np.empty(count)
@@ -132,7 +134,11 @@ def _companions(squared_m2: Floats, mutual: Floats) -> tuple[Floats, Floats]:
             if partner >= 0:
                 partners[found] = squared_m2[i, partner]
                 found += 1
-        nearest[i] = squared_m2[i, near] / (4 if mutual[i, near] <= _SHARED else 1)
+        apart = True
+        for j in range(count):
+            if j != i and squared_m2[i, j] <= _AS_NEAR * squared_m2[i, near]:
+                apart = apart and mutual[i, j] <= _SHARED
+        nearest[i] = squared_m2[i, near] / (4 if apart else 1)
     return np.sqrt(partners[:found]), np.sqrt(nearest)
 
 

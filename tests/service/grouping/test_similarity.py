@@ -125,6 +125,15 @@ def test_too_few_partners_tell_nothing() -> None:
     assert shared_sigma_m(np.square(distance_m[:4, :4]), sharing(4, _03=0.9)) == 9.0
 
 
+@pytest.mark.parametrize("order", [[0, 1, 2], [0, 2, 1], [2, 1, 0]])
+def test_of_those_as_near_whoever_may_share_more_speaks(order: list[int]) -> None:
+    # 1 and 2 are as near to 0, to rounding; of 2 nothing is known.
+    squared_m2 = np.square(at((0, 0, 0), (0.1 + 0.2, 0, 0), (0, 0.3, 0)))
+    mutual = sharing(3, _01=0.1)
+    rows = np.array(order)
+    assert shared_sigma_m(reordered(squared_m2, rows), reordered(mutual, rows)) == pytest.approx(0.3)
+
+
 def test_where_most_stand_in_one_place_the_mean_distance_is_the_range() -> None:
     distance_m = at(*[(0, 0, 0)] * 5, (6, 0, 0))
     assert shared_sigma_m(np.square(distance_m), unknown(6)) == pytest.approx(distance_m.mean())
