@@ -2,6 +2,7 @@
 
 import math
 from itertools import count as numbers
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -129,7 +130,7 @@ class Swarm(RuleBasedStateMachine):
         for name in troop:
             self.enter(name, tuple((np.array(centre_m) + rng.normal(0, 2, 3)).tolist()))
         if sharing:
-            for a, b in zip(troop, troop[1:], strict=False):
+            for a, b in pairwise(troop):
                 self.tell(a, b, *rng.uniform(0, 1, 2).tolist())
 
     @precondition(lambda self: self.position_m)
