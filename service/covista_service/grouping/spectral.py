@@ -7,15 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
-from scipy.sparse.linalg import eigsh
 
 from covista_service.grouping.k_means import Labels, k_means
 from covista_service.grouping.similarity import Floats
 
 # Up to this many robots every row starts a seeding; a larger swarm is seeded from that many rows.
 MAX_STARTS = 48
-# From this many robots on, few eigenvectors are cheaper found one by one than all at once, if they are fewer than a
-# certain share of all.
+# From this many robots on, a few eigenvectors are cheaper than all, if they are fewer than a certain share. Lanczos
+# would be cheaper still, but finds one vector of the many that groups with nothing in common share an eigenvalue with.
 PARTIAL_FROM = 200
 PARTIAL_SHARE = 0.1
 
@@ -39,10 +38,11 @@ class Spectrum:
         degree = S.sum(axis=1)
         scale = 1 / np.sqrt(degree)
         normalised = scale[:, None] * S * scale
-        if most is None or len(S) < PARTIAL_FROM or most > PARTIAL_SHARE * len(S):
-            values, vectors = eigh(normalised, overwrite_a=True, check_finite=False)
-        else:
-            values, vectors = _largest(normalised, most)
+        count = len(S)
+        subset = None
+        if most is not None and count >= PARTIAL_FROM and most <= PARTIAL_SHARE * count:
+            subset = (count - most, count - 1)
+        values, vectors = eigh(normalised, subset_by_index=subset, overwrite_a=True, check_finite=False)
         return cls(np.ascontiguousarray(vectors[:, ::-1]), values[::-1], degree)
 
     @property
@@ -76,12 +76,3 @@ def _starts(degree: Floats) -> NDArray[np.intp]:
         return np.arange(len(degree))
     spread = np.linspace(0, len(degree) - 1, MAX_STARTS).astype(np.intp)
     return np.argsort(degree, kind="stable")[spread]
-
-
-def _largest(normalised: Floats, most: int) -> tuple[Floats, Floats]:
-    """The `most` largest eigenvalues, rising, and their eigenvectors, by Lanczos."""
-    # Any start will do, if it is no eigenvector and the same every time.
-    start = 1 + 0.1 * np.cos(np.arange(len(normalised)))
-    values, vectors = eigsh(normalised, k=most, which="LA", v0=start, tol=1e-10)
-    order = np.argsort(values)
-    return values[order], vectors[:, order]
