@@ -108,20 +108,15 @@ def _within(sigma_m: float) -> float:
 
 @compiled
 def _companions(squared_m2: Floats, mutual: Floats) -> tuple[Floats, Floats]:
-    """Distances of everybody's two partners, those who share enough; and how far everybody's nearest robot is (N,).
-
-    Half of that if the two are known to share little, whoever of those as near it is: so far is too far, then.
-    """
+    """Distances of everybody's two partners, those who share enough; and how far everybody's nearest robot is (N,)."""
     count = len(squared_m2)
     partners, found, nearest = np.empty(_PARTNERS * count), 0, np.empty(count)
     for i in range(count):
-        first, second, one, other, near, least = _SHARED, _SHARED, -1, -1, -1, np.inf
+        first, second, one, other = _SHARED, _SHARED, -1, -1
         for j in range(count):
             if j == i:
                 continue
             square, q = squared_m2[i, j], mutual[i, j]
-            if square < least:
-                near, least = j, square
             # So it is with nearly all, and where the overlap is unknown.
             if not q >= second:
                 continue
@@ -134,12 +129,24 @@ def _companions(squared_m2: Floats, mutual: Floats) -> tuple[Floats, Floats]:
             if partner >= 0:
                 partners[found] = squared_m2[i, partner]
                 found += 1
-        apart = True
-        for j in range(count):
-            if j != i and squared_m2[i, j] <= _AS_NEAR * squared_m2[i, near]:
-                apart = apart and mutual[i, j] <= _SHARED
-        nearest[i] = squared_m2[i, near] / (4 if apart else 1)
+        nearest[i] = _nearest_m2(squared_m2[i], mutual[i], i)
     return np.sqrt(partners[:found]), np.sqrt(nearest)
+
+
+@compiled
+def _nearest_m2(squared_m2: Floats, mutual: Floats, i: int) -> float:
+    """How far robot i's nearest is, squared, by squared distances (N,) and mutual overlaps (N,).
+
+    Half as far if the two are known to share little, whoever of those as near it is: so far is too far, then.
+    """
+    near = np.inf
+    for j in range(len(squared_m2)):
+        if j != i:
+            near = min(near, squared_m2[j])
+    for j in range(len(squared_m2)):
+        if j != i and squared_m2[j] <= _AS_NEAR * near and not mutual[j] <= _SHARED:
+            return near
+    return near / 4
 
 
 @compiled
