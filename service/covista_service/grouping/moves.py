@@ -25,7 +25,8 @@ def settle(S: Floats, expected: Floats, start: Labels) -> Labels:
 
     S (N, N) similarities, `expected` (N,) what robots may expect of a companion (`scores.expectations`): a pair inside
     a group gains s_ij - (e_i + e_j)/2. `start` (N,) labels from 0 to N - 1 to begin with: all alone, or the groups on
-    show. Robots move in the order of what they expect, so that their order in the matrix does not matter.
+    show. Robots move in the order of what they expect, of those who expect no more than of a stranger in the order of
+    what they have in common with all, so that their order in the matrix does not matter.
     """
     count = len(S)
     labels = start.copy()
@@ -33,7 +34,8 @@ def settle(S: Floats, expected: Floats, start: Labels) -> Labels:
         return labels
     begin, friends = _friends(S, expected)
     following, first, size = _chains(labels)
-    order = np.argsort(-expected, kind="mergesort")
+    order = np.argsort(-S.sum(axis=1), kind="mergesort")
+    order = order[np.argsort(-expected[order], kind="mergesort")]
     for _ in range(_ROUNDS):
         _move_all(S, expected, begin, friends, order, labels, following, first, size)
         if not _merge_best(S, expected, begin, friends, labels, following, first, size):
