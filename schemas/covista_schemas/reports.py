@@ -227,7 +227,7 @@ class Hysteresis(Report):
         default=0.05,
         ge=0,
         le=0.9,
-        description="Share that groups on show have in the similarity that groups are made from: others must gain more.",
+        description="Share of the groups on show in the similarity that groups are made from: others must gain more.",
     )
     persistence_s: float = Field(
         default=5.0,

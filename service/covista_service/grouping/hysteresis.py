@@ -68,7 +68,7 @@ class Standing:
 
 @compiled
 def held(S: Floats, labels: _Labels, gain: float) -> Floats:
-    """Similarities (N, N) mixed with the groups on show, labels (N,): (1 - gain) s_ij + gain where i, j are together."""
+    """Similarities (N, N) with the groups on show (N,) mixed in: (1 - gain) s_ij, and gain more for those together."""
     mixed = np.empty_like(S)
     for i in range(len(S)):
         for j in range(len(S)):

@@ -38,7 +38,7 @@ def standard(distance_m: Floats) -> float:
 
 
 def shared(distance_m: Floats, mutual: Floats) -> float:
-    """Three times the median distance to the two that each has most in common with, of more than a quarter."""
+    """Two and a half times the median distance to the two that each has most in common with, of more than a quarter."""
     count = len(distance_m)
     if count < 2:
         return 1.0
@@ -51,19 +51,22 @@ def shared(distance_m: Floats, mutual: Floats) -> float:
         partners_m += apart_m[order[q[order] > 0.25]].tolist()
         nearest = apart_m.min()
         nearest_m.append(nearest / 2 if (q[apart_m <= nearest * (1 + 1e-9)] <= 0.25).all() else nearest)
-    sigma = 3 * float(np.median(partners_m)) if len(partners_m) >= count / 2 else float(np.median(nearest_m))
+    sigma = 2.5 * float(np.median(partners_m)) if len(partners_m) >= count / 2 else float(np.median(nearest_m))
     return sigma or float(distance_m.mean()) or 1.0
 
 
 def chained(mutual: Floats) -> Floats:
-    """What is unknown, by the best chain over one other robot; NaN where there is none, or nothing passes."""
-    known = np.nan_to_num(mutual, nan=0.0)
-    np.fill_diagonal(known, 0.0)
+    """What is unknown, by the best chain over a third robot with whom one of the two shares more than a quarter.
+
+    NaN where there is none.
+    """
     result = mutual.copy()
-    for i, own in enumerate(known):
-        best = (own[:, None] * known).max(axis=0)
-        unknown = np.isnan(mutual[i])
-        result[i, unknown] = np.where(best > 0, best, np.nan)[unknown]
+    for i, j in np.argwhere(np.isnan(mutual)).tolist():
+        first, second = mutual[i], mutual[j]
+        with np.errstate(invalid="ignore"):
+            links = (np.maximum(first, second) > 0.25) & ~np.isnan(first * second)
+        links[[i, j]] = False
+        result[i, j] = (first * second)[links].max() if links.any() else np.nan
     return result
 
 

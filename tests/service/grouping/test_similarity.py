@@ -105,16 +105,18 @@ ROW = at((0, 0, 0), (1, 0, 0), (3, 0, 0), (7, 0, 0))
     [
         # Everybody's partners, nearest robots' distances being 1, 1, 2, 4.
         (unknown(4), 1.5),
-        (sharing(4, _01=0.5), 3 * 1),
-        (sharing(4, _02=0.26, _23=0.5), 3 * 3.5),
+        (sharing(4, _01=0.5), 2.5 * 1),
+        (sharing(4, _02=0.26, _23=0.5), 2.5 * 3.5),
         # Of three partners the two that most is shared with: 0: 3, 7; 1: 1; 2: 3; 3: 7.
-        (sharing(4, _01=0.3, _02=0.5, _03=0.4), 3 * 3),
+        (sharing(4, _01=0.3, _02=0.5, _03=0.4), 2.5 * 3),
         # Not more than a quarter: no partners, and too far.
         (sharing(4, _01=0.25), 1.25),
         (sharing(4, _01=0.0, _02=0.0, _03=0.0, _12=0.0, _13=0.0, _23=0.0), 0.75),
     ],
 )
-def test_shared_is_three_times_the_distance_to_the_robots_that_most_is_shared_with(mutual, expected: float) -> None:
+def test_shared_is_two_and_a_half_times_the_distance_to_the_robots_that_most_is_shared_with(
+    mutual, expected: float
+) -> None:
     assert shared_sigma_m(np.square(ROW), mutual) == pytest.approx(expected)
 
 
@@ -122,7 +124,7 @@ def test_too_few_partners_tell_nothing() -> None:
     # One pair, two partners of nine robots, which stand 1 m apart in a row.
     distance_m = at(*((x, 0, 0) for x in range(9)))
     assert shared_sigma_m(np.square(distance_m), sharing(9, _05=0.9)) == 1.0
-    assert shared_sigma_m(np.square(distance_m[:4, :4]), sharing(4, _03=0.9)) == 9.0
+    assert shared_sigma_m(np.square(distance_m[:4, :4]), sharing(4, _03=0.9)) == 7.5
 
 
 @pytest.mark.parametrize("order", [[0, 1, 2], [0, 2, 1], [2, 1, 0]])
@@ -159,9 +161,13 @@ def test_a_share_told_by_one_of_two_is_unknown() -> None:
         (sharing(4, _02=0.5, _12=0.8), 0.4),
         # The better of two chains.
         (sharing(4, _02=0.5, _12=0.8, _03=0.7, _13=0.7), 0.49),
-        # A chain over two robots is none, and what passes nothing on is no link.
+        # A chain over two robots is none.
         (sharing(4, _02=0.9, _23=0.9, _13=0.9), None),
-        (sharing(4, _02=0.9, _12=0.0), None),
+        # Who sees nothing of what the other's companion sees will see nothing of the other's view.
+        (sharing(4, _02=0.9, _12=0.0), 0.0),
+        # A robot that neither shares much with tells nothing of the two.
+        (sharing(4, _02=0.25, _12=0.25), None),
+        (sharing(4, _02=0.0, _12=0.0, _03=0.26, _13=0.1), 0.026),
         (sharing(4, _02=0.9), None),
         # Where it is known the best chain does not matter.
         (sharing(4, _01=0.1, _02=0.9, _12=0.9), 0.1),
