@@ -55,5 +55,6 @@ METHODS: Mapping[str, Method] = {
     "overlap": overlapping,
     "coslam": coslams,
 }
-# Of swarms that are rendered: groups by numbers of matched features, by the criterion of the first method.
-FEATURES_CRITERION: Criterion = "adaptive"
+# Of swarms that are rendered: groups by numbers of matched features, by Eq. 17, which asks for no outsider: counts have
+# no scale to place one on.
+FEATURES_CRITERION: Criterion = "fiedler"

@@ -17,7 +17,7 @@ from covista_service.drawing import timeline
 from covista_service.grouping.continuity import Grouping, follow
 from covista_service.grouping.hysteresis import HysteresisOptions, Pending, held, weigh
 from covista_service.grouping.k_means import Labels
-from covista_service.grouping.selection import SelectionOptions, choose, contributions
+from covista_service.grouping.selection import Criterion, SelectionOptions, choose, contributions
 from covista_service.grouping.similarity import Floats, matrix
 
 COUNTS = (10, 30, 100)
@@ -64,15 +64,17 @@ class Setting:
 class Row:
     """What a setting does, as means over drives.
 
-    Changes are labels of robots that are not what they were a step before. `own` are those of the true overlaps. `lag`
-    is how many steps after the truth the mover is shown with a new group; `astray` the share of steps in which it is
-    not with the group with which it truly is.
+    Changes are labels of robots that are not what they were a step before; `others` are those of all but the mover,
+    and `true` all that the true overlaps make. `lag` is how many steps after the truth the mover is shown with a new
+    group; `astray` the share of steps in which it is not with the group with which it truly is.
     """
 
+    criterion: Criterion
     robots: int
     setting: str
     changes_per_100: float
-    own_per_100: float
+    others_per_100: float
+    true_per_100: float
     lag_steps: float
     astray: float
 
@@ -162,7 +164,10 @@ def rows(
             true = labels_over_time(driven.distance_m, driven.true, options, None)
             for setting in settings:
                 by_setting[setting.name].append(_judged(driven, true, _shown(driven, options, setting)))
-        found += [Row(count, name, *np.mean(values, axis=0).tolist()) for name, values in by_setting.items()]
+        found += [
+            Row(options.criterion, count, name, *np.mean(values, axis=0).tolist())
+            for name, values in by_setting.items()
+        ]
     return found
 
 
@@ -209,12 +214,13 @@ def _changes(labels: Labels) -> int:
     return int((labels[1:] != labels[:-1]).sum())
 
 
-def _judged(driven: Drive, true: Labels, shown: Labels) -> tuple[float, float, float, float]:
+def _judged(driven: Drive, true: Labels, shown: Labels) -> tuple[float, float, float, float, float]:
     """The numbers of a row for label numbers (T, N): true ones, and as shown."""
     steps = len(shown) - 1
     truly, home = _homes(true, driven.planted), _homes(shown, driven.planted)
     lags = _lags(truly, home)
-    return 100 * _changes(shown) / steps, 100 * _changes(true) / steps, lags, float((truly != home).mean())
+    changes = [100 * _changes(labels) / steps for labels in (shown, shown[:, 1:], true)]
+    return changes[0], changes[1], changes[2], lags, float((truly != home).mean())
 
 
 def _homes(labels: Labels, planted: Labels) -> Labels:

@@ -11,30 +11,36 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from covista_service.evaluation.files import make_folder
+from covista_service.evaluation.planted import mover
 from covista_service.evaluation.planted.run import RunOptions
 from covista_service.evaluation.planted.trial import Figures, Trial, figures, size_classes
+from covista_service.grouping.selection import SelectionOptions
 
 if TYPE_CHECKING:
     from rich.table import Table
 
 
-def as_json(options: RunOptions, trials: Sequence[Trial]) -> str:
-    """The setting, the figures of every variant and method, and every trial."""
+def as_json(options: RunOptions, trials: Sequence[Trial], moved: Sequence[mover.Row]) -> str:
+    """The setting, the figures of every variant and method, those of noisy movers, and every trial."""
     found = {
         "setting": asdict(options),
         "figures": [each.as_json() for each in figures(trials, options.largest)],
+        "movers": [asdict(row) for row in moved],
         "trials": [asdict(trial) for trial in trials],
     }
     return json.dumps(found, allow_nan=False)
 
 
-def write(folder: Path, options: RunOptions, trials: Sequence[Trial]) -> None:
-    """planted.json, and for each variant two plots: the ARI over classes of size, and how it spreads."""
+def write(folder: Path, options: RunOptions, trials: Sequence[Trial], moved: Sequence[mover.Row]) -> None:
+    """planted.json; for each variant two plots, the ARI over classes of size and how it spreads; one of a mover."""
     from covista_service.drawing import plots
     from covista_service.drawing.class_plot import class_plot
 
     make_folder(folder)
-    (folder / "planted.json").write_text(as_json(options, trials) + "\n", encoding="utf-8")
+    (folder / "planted.json").write_text(as_json(options, trials, moved) + "\n", encoding="utf-8")
+    if moved:
+        lines = mover.timelines(SelectionOptions(), seed=options.first_seed)
+        (folder / "mover.png").write_bytes(mover.plot(lines))
     found = figures(trials, options.largest)
     for variant in dict.fromkeys(each.variant for each in found):
         here = [each for each in found if each.variant == variant]
@@ -50,11 +56,27 @@ def write(folder: Path, options: RunOptions, trials: Sequence[Trial]) -> None:
         (folder / f"{variant}_spread.png").write_bytes(plots.boxes(spread, title, "adjusted Rand index"))
 
 
-def tables(options: RunOptions, trials: Sequence[Trial]) -> list[Table]:
-    """A table of every variant."""
+def tables(options: RunOptions, trials: Sequence[Trial], moved: Sequence[mover.Row]) -> list[Table]:
+    """A table of every variant, and one of noisy movers."""
     found = figures(trials, options.largest)
     variants = dict.fromkeys(each.variant for each in found)
-    return [_table(variant, [each for each in found if each.variant == variant]) for variant in variants]
+    of_variants = [_table(variant, [each for each in found if each.variant == variant]) for variant in variants]
+    return [*of_variants, _movers(moved)] if moved else of_variants
+
+
+def _movers(moved: Sequence[mover.Row]) -> Table:
+    from rich.table import Table
+
+    table = Table(title="a noisy mover: changes of labels per 100 steps of 1 s")
+    for title in ("criterion", "robots", "shown"):
+        table.add_column(title, no_wrap=True)
+    for title in ("changes", "of others", "truly", "lag s", "astray"):
+        table.add_column(title, justify="right")
+    for row in moved:
+        counts = (row.changes_per_100, row.others_per_100, row.true_per_100, row.lag_steps)
+        figures_of_row = [f"{value:.1f}" for value in counts]
+        table.add_row(row.criterion, str(row.robots), row.setting, *figures_of_row, f"{row.astray:.2f}")
+    return table
 
 
 def _table(variant: str, found: Sequence[Figures]) -> Table:

@@ -11,9 +11,11 @@ from covista_service.evaluation.planted.comparators import coslam_groups
 from covista_service.evaluation.planted.judging import adjusted_rand
 from covista_service.evaluation.planted.layout import Labels
 from covista_service.evaluation.planted.methods import FEATURES_CRITERION, METHODS, Method, by_similarity
+from covista_service.evaluation.planted.mover import Row, rows
 from covista_service.evaluation.planted.rendered import RenderedSwarm, rendered
 from covista_service.evaluation.planted.swarm import CLASSES, Disturbance, Swarm, disturbed, plant
 from covista_service.evaluation.planted.trial import Trial
+from covista_service.grouping.selection import Criterion, SelectionOptions
 
 Tell = Callable[[str], None]
 
@@ -25,18 +27,24 @@ VARIANTS: Mapping[str, Disturbance] = {
     "biased": Disturbance(bias=0.2),
 }
 RENDERED = "rendered"
+# Criteria that are compared with a noisy mover.
+_LIVE: tuple[Criterion, ...] = ("adaptive", "gain", "fiedler")
 # Seeds of the first block, grouped once before anything is timed.
 _WARM = 0
 
 
 @dataclass(frozen=True, slots=True)
 class RunOptions:
-    """Which swarms: `seeds` of them from `first_seed`, of at most `largest` robots, and `rendered` more from images."""
+    """Which swarms: `seeds` of them from `first_seed`, of at most `largest` robots, and `rendered` more from images.
+
+    `drives` is how many movers drive through noisy swarms of each size.
+    """
 
     seeds: int = 216
     first_seed: int = 1000
     largest: int = CLASSES[-1][1]
     rendered: int = 4
+    drives: int = 8
 
 
 def run(options: RunOptions, tell: Tell = lambda _: None) -> Iterator[Trial]:
@@ -53,6 +61,15 @@ def run(options: RunOptions, tell: Tell = lambda _: None) -> Iterator[Trial]:
         tell(f"rendered seed {seed}")
         seen = rendered(seed)
         yield from _trials(RENDERED, seen.swarm, methods_of(seen))
+
+
+def moving(options: RunOptions, tell: Tell = lambda _: None) -> list[Row]:
+    """How still groups stand while a robot drives from one to another, by the criteria that may run live."""
+    found: list[Row] = []
+    for criterion in _LIVE if options.drives else ():
+        tell(f"noisy movers: {criterion}")
+        found += rows(SelectionOptions(criterion=criterion), drives=options.drives, seed=options.first_seed)
+    return found
 
 
 def methods_of(seen: RenderedSwarm) -> dict[str, Method]:

@@ -2,10 +2,12 @@ from __future__ import annotations
 
 import json
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
 import typer
+from covista_service.evaluation.planted import mover
 from covista_service.evaluation.planted import run as runs
 from covista_service.evaluation.planted.command import planted
 from covista_service.evaluation.planted.methods import METHODS
@@ -13,14 +15,14 @@ from typer.testing import CliRunner
 
 APP = typer.Typer()
 APP.command()(planted)
-TINY = ["--first-seed", "1008", "--seeds", "2", "--rendered", "0"]
+TINY = ["--first-seed", "1008", "--seeds", "2", "--rendered", "0", "--drives", "0"]
 
 
 def test_json_stands_alone_on_stdout_and_progress_beside_it() -> None:
     result = CliRunner().invoke(APP, [*TINY, "--format", "json"])
     assert result.exit_code == 0, result.stderr
     found = json.loads(result.stdout)
-    assert found["setting"] == {"seeds": 2, "first_seed": 1008, "largest": 200, "rendered": 0}
+    assert found["setting"] == {"seeds": 2, "first_seed": 1008, "largest": 200, "rendered": 0, "drives": 0}
     assert {(each["variant"], each["method"]) for each in found["figures"]} == {
         (variant, method) for variant in runs.VARIANTS for method in METHODS
     }
@@ -46,6 +48,18 @@ def test_a_folder_gets_the_figures_and_two_plots_of_every_variant(tmp_path: Path
     assert {path.name for path in out.iterdir()} == pictures | {"planted.json"}
     assert all((out / name).read_bytes().startswith(b"\x89PNG") for name in pictures)
     assert len(json.loads((out / "planted.json").read_text())["trials"]) == 2 * len(runs.VARIANTS) * len(METHODS)
+
+
+def test_movers_have_a_table_and_a_plot_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runs, "rows", partial(mover.rows, counts=(10,), settings=mover.SETTINGS[-1:]))
+    arguments = ["--first-seed", "1008", "--seeds", "1", "--rendered", "0", "--drives", "1", "--out", str(tmp_path)]
+    result = CliRunner().invoke(APP, arguments)
+    assert result.exit_code == 0, result.stderr
+    assert "a noisy mover" in result.stdout
+    assert (tmp_path / "mover.png").read_bytes().startswith(b"\x89PNG")
+    rows = json.loads((tmp_path / "planted.json").read_text())["movers"]
+    assert [row["criterion"] for row in rows] == ["adaptive", "gain", "fiedler"]
+    assert all(row["others_per_100"] <= row["changes_per_100"] for row in rows)
 
 
 def test_the_same_seeds_give_the_same_figures() -> None:

@@ -54,7 +54,7 @@ def test_components_do_not_ask_who_is_unknown() -> None:
     swarm = clear((4, 4))
     blind = replace(swarm, overlap=np.where(np.eye(len(swarm)) > 0, 1.0, np.nan))
     assert np.array_equal(mutual(blind), np.eye(len(swarm)))
-    assert len(set(METHODS["components"](blind).tolist())) == len(swarm)
+    assert len(set(METHODS["overlap"](blind).tolist())) == len(swarm)
 
 
 def test_one_link_is_enough_for_components_and_too_little_for_groups() -> None:
@@ -63,8 +63,17 @@ def test_one_link_is_enough_for_components_and_too_little_for_groups() -> None:
     overlap = swarm.overlap.copy()
     overlap[a, b] = overlap[b, a] = 0.5
     linked = replace(swarm, overlap=overlap)
-    assert len(set(METHODS["components"](linked).tolist())) == 1
+    assert len(set(METHODS["overlap"](linked).tolist())) == 1
     assert adjusted_rand(swarm.truth, METHODS["fiedler"](linked)) == 1.0
+
+
+def test_the_station_s_components_hang_together_over_strong_links() -> None:
+    swarm = clear((5, 5))
+    assert adjusted_rand(swarm.truth, METHODS["components"](swarm)) == 1.0
+    a, b = int(np.flatnonzero(swarm.truth == 0)[0]), int(np.flatnonzero(swarm.truth == 1)[0])
+    overlap = swarm.overlap.copy()
+    overlap[a, b] = overlap[b, a] = 0.7
+    assert len(set(METHODS["components"](replace(swarm, overlap=overlap)).tolist())) == 1
 
 
 def test_coslam_parts_who_shares_nothing_and_who_is_too_far_away() -> None:

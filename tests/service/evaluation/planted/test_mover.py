@@ -72,9 +72,9 @@ def test_without_hysteresis_labels_are_the_proposals_and_keep_to_their_groups() 
 def test_hysteresis_changes_less_than_what_is_proposed_and_freezes_nobody() -> None:
     raw, held = mover.rows(GAIN, (10,), 3, (AS_PROPOSED, HYSTERESIS))
     assert (raw.setting, held.setting) == (AS_PROPOSED.name, HYSTERESIS.name)
-    assert raw.own_per_100 == held.own_per_100
+    assert raw.true_per_100 == held.true_per_100
     assert held.changes_per_100 < raw.changes_per_100 / 4
-    assert held.changes_per_100 <= held.own_per_100 + 2
+    assert held.changes_per_100 <= held.true_per_100 + 2
     assert raw.lag_steps <= held.lag_steps < 10
     assert held.astray < 0.2
 
