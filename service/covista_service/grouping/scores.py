@@ -72,9 +72,9 @@ def expected_of(company: Floats, stranger: float, demand: float) -> Floats:
 
 @compiled
 def best_company(S: Floats) -> Floats:
-    """The mean of the two largest similarities of each robot to others (N,); -inf for a robot without others."""
+    """The mean of the two largest similarities of each robot to others (N,); 0 for a robot without others."""
     count = len(S)
-    result = np.empty(count)
+    result = np.zeros(count)
     for i in range(count):
         first, second = -np.inf, -np.inf
         for j in range(count):
@@ -84,7 +84,8 @@ def best_company(S: Floats) -> Floats:
                     first, second = s, first
                 elif s > second:
                     second = s
-        result[i] = first if second == -np.inf else (first + second) / 2
+        if count > 1:
+            result[i] = first if second == -np.inf else (first + second) / 2
     return result
 
 
