@@ -20,6 +20,8 @@ _TIGHTEST_M, _WIDEST_M = 1e-100, 1e100
 _SHARED = 0.25
 _PARTNERS = 2
 _REACH = 2.5
+# Up to so many links are looked at in turn, each for all robots at once.
+_FEW = 20
 # As near as the nearest, to rounding of squares.
 _AS_NEAR = 1 + 1e-9
 
@@ -172,27 +174,43 @@ def _mix(squared_m2: Floats, mutual: Floats, alpha: float, sigma2_m2: float, S: 
 @compiled
 def _chain(mutual: Floats, alpha: float, S: Floats) -> None:
     """Where the overlap is unknown S holds d_ij: mix in what the best link passes on, where there is one."""
+    count = len(mutual)
     begin, links = _links(mutual)
-    for i in range(len(mutual)):
-        for j in range(i):
+    best = np.empty(count)
+    for i in range(count):
+        best[:] = -1.0
+        _pass_on(mutual, i, links[begin[i] : begin[i + 1]], best)
+        for j in range(count):
             if np.isnan(mutual[i, j]):
-                best = _passed_on(mutual, i, j, links[begin[i] : begin[i + 1]], -1.0)
-                best = _passed_on(mutual, j, i, links[begin[j] : begin[j + 1]], best)
-                if best >= 0:
-                    S[i, j] = S[j, i] = alpha * best + (1 - alpha) * S[i, j]
+                if j > i:
+                    # Kept until it is the turn of row j and its links.
+                    S[i, j] = best[j]
+                else:
+                    q = max(best[j], S[j, i])
+                    if q >= 0:
+                        S[i, j] = alpha * q + (1 - alpha) * S[i, j]
+                    S[j, i] = S[i, j]
 
 
 @compiled
-def _passed_on(mutual: Floats, i: int, j: int, links: NDArray[np.int64], best: float) -> float:
-    """The best that links of robot i, the best first, pass on to robot j; `best` if none passes on more."""
-    for k in links:
-        # The rest passes on less, for nobody shares more than everything.
-        if mutual[i, k] <= best:
-            break
-        # False where the second step is unknown.
-        if mutual[i, k] * mutual[j, k] > best:
-            best = mutual[i, k] * mutual[j, k]
-    return best
+def _pass_on(mutual: Floats, i: int, links: NDArray[np.int64], best: Floats) -> None:
+    """What links of robot i, the best first, pass on at most to those whose overlap is unknown, if they do: (N,)."""
+    if len(links) <= _FEW:
+        # Line by line: of many robots who see little of each other most is unknown.
+        for k in links:
+            for j in range(len(best)):
+                # False where the second step is unknown.
+                if mutual[i, k] * mutual[k, j] > best[j]:
+                    best[j] = mutual[i, k] * mutual[k, j]
+        return
+    for j in range(len(best)):
+        if np.isnan(mutual[i, j]):
+            for k in links:
+                # The rest passes on less, for nobody shares more than everything.
+                if mutual[i, k] <= best[j]:
+                    break
+                if mutual[i, k] * mutual[j, k] > best[j]:
+                    best[j] = mutual[i, k] * mutual[j, k]
 
 
 @compiled
