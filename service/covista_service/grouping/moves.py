@@ -32,9 +32,9 @@ def settle(S: Floats, expected: Floats, start: Labels) -> Labels:
     labels = start.copy()
     if count < 2:
         return labels
-    begin, friends = _friends(S, expected)
+    begin, friends, in_common = _friends(S, expected)
     following, first, size = _chains(labels)
-    order = np.argsort(-S.sum(axis=1), kind="mergesort")
+    order = np.argsort(-in_common, kind="mergesort")
     order = order[np.argsort(-expected[order], kind="mergesort")]
     for _ in range(_ROUNDS):
         _move_all(S, expected, begin, friends, order, labels, following, first, size)
@@ -44,11 +44,17 @@ def settle(S: Floats, expected: Floats, start: Labels) -> Labels:
 
 
 @compiled
-def _friends(S: Floats, expected: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Whose company exceeds expectations: robots `friends[begin[i]:begin[i + 1]]` of robot i."""
+def _friends(S: Floats, expected: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
+    """Whose company exceeds expectations: robots `friends[begin[i]:begin[i + 1]]` of robot i.
+
+    And what each has in common with all (N,), from the same look at the matrix.
+    """
     count, found = len(S), 0
     begin, friends = np.zeros(count + 1, np.intp), np.empty(_FEW * count, np.intp)
+    in_common = np.zeros(count)
     for i in range(count):
+        for j in range(count):
+            in_common[i] += S[i, j]
         if found + count > len(friends):
             friends = np.concatenate((friends, np.empty(len(friends), np.intp)))
         own = expected[i]
@@ -57,7 +63,7 @@ def _friends(S: Floats, expected: Floats) -> tuple[NDArray[np.intp], NDArray[np.
                 friends[found] = j
                 found += 1
         begin[i + 1] = found
-    return begin, friends[:found]
+    return begin, friends[:found], in_common
 
 
 @compiled
