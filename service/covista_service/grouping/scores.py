@@ -66,7 +66,7 @@ def expectations(S: Floats, stranger: float, demand: float) -> Floats:
 
 def expected_of(company: Floats, stranger: float, demand: float) -> Floats:
     """The same from `best_company` (N,), which is what takes time."""
-    result: Floats = np.maximum(demand * np.maximum(company, 0.0), stranger)
+    result: Floats = np.maximum(demand * company, stranger)
     return result
 
 

@@ -15,8 +15,8 @@ from covista_service.grouping.similarity import Floats
 MAX_STARTS = 48
 # From this many robots on, a few eigenvectors are cheaper than all, if they are fewer than a certain share. Lanczos
 # would be cheaper still, but finds one vector of the many that groups with nothing in common share an eigenvalue with.
-PARTIAL_FROM = 200
-PARTIAL_SHARE = 0.1
+PARTIAL_FROM = 100
+PARTIAL_SHARE = 0.2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,6 +63,8 @@ def partition(spectrum: Spectrum, m: int) -> Labels:
     count = len(spectrum.vectors)
     if not 1 <= m <= count:
         raise ValueError(f"{count} robots cannot form {m} groups")
+    if m > spectrum.most and m < count:
+        raise ValueError(f"these eigenvectors serve up to {spectrum.most} groups, not {m}")
     if m == 1:
         return np.zeros(count, np.intp)
     if m == count:
