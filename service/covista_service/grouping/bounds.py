@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from covista_service.compiled import compiled
 from covista_service.grouping.k_means import Labels
 from covista_service.grouping.similarity import Floats
 
@@ -67,30 +68,91 @@ def with_least_size(S: Floats, labels: Labels, size: int, least: int) -> Labels:
     """Groups of at least `size` robots, and at least `least` groups, out of others: `size * least` <= N.
 
     The smallest group merges into the one that it has most in common with on average, as long as there are more than
-    `least`; else it takes in, one by one, whom it suits best compared with the group that can spare him. Labels (N,)
-    from 0 to M - 1, without gaps, in no order.
+    `least`; else it takes in, one by one, whom it suits best compared with the group that can spare him. Of groups as
+    small that one does first which it suits best. Labels (N,) from 0 to M - 1, without gaps, in no order.
     """
-    labels = np.unique(labels, return_inverse=True)[1].astype(np.intp)
+    enlarged = np.unique(labels, return_inverse=True)[1].astype(np.intp)
+    _merge_smallest(S, enlarged, size, least)
+    enlarged = np.unique(enlarged, return_inverse=True)[1].astype(np.intp)
+    _take_in(S, enlarged, size)
+    return enlarged
+
+
+@compiled
+def _merge_smallest(S: Floats, labels: Labels, size: int, least: int) -> None:
+    """Merge, in place, as long as there are small groups and more than the least number of them."""
+    common, sizes = _in_common(S, labels)
+    m = len(sizes)
+    between = np.zeros((m, m))
+    for i in range(len(S)):
+        between[labels[i]] += common[i]
+    for _ in range(m - least):
+        smallest = _smallest(sizes)
+        if smallest >= size:
+            return
+        small, to = _best_merger(between, sizes, smallest)
+        between[to] += between[small]
+        between[:, to] = between[to]
+        sizes[to] += smallest
+        sizes[small] = 0
+        for i in range(len(S)):
+            if labels[i] == small:
+                labels[i] = to
+
+
+@compiled
+def _best_merger(between: Floats, sizes: NDArray[np.intp], smallest: int) -> tuple[int, int]:
+    """Of groups that have `between` (m, m) in common the smallest that has most with another, and that other."""
+    small, to, most = -1, -1, -np.inf
+    for a in range(len(sizes)):
+        if sizes[a] == smallest:
+            for b in range(len(sizes)):
+                if b != a and sizes[b] and between[a, b] / sizes[b] > most:
+                    small, to, most = a, b, between[a, b] / sizes[b]
+    return small, to
+
+
+@compiled
+def _take_in(S: Floats, labels: Labels, size: int) -> None:
+    """Let small groups grow, in place, by robots of groups that can spare them."""
+    common, sizes = _in_common(S, labels)
     while True:
-        sizes = np.bincount(labels)
-        small = int(sizes.argmin())
-        if sizes[small] >= size:
-            return labels
-        means = _means(S, labels, len(sizes))
-        if len(sizes) > least:
-            to = means[labels == small].mean(axis=0)
-            to[small] = -np.inf
-            labels[labels == small] = int(to.argmax())
-            labels = np.unique(labels, return_inverse=True)[1].astype(np.intp)
-        else:
-            better = means[:, small] - means[np.arange(len(S)), labels]
-            better[(sizes[labels] <= size) | (labels == small)] = -np.inf
-            labels[int(better.argmax())] = small
+        smallest = _smallest(sizes)
+        if smallest >= size:
+            return
+        robot, to, most = -1, -1, -np.inf
+        for i in range(len(S)):
+            own = labels[i]
+            if sizes[own] > size:
+                left = (common[i, own] - S[i, i]) / (sizes[own] - 1)
+                for group in range(len(sizes)):
+                    if sizes[group] == smallest and common[i, group] / smallest - left > most:
+                        robot, to, most = i, group, common[i, group] / smallest - left
+        own = labels[robot]
+        sizes[own] -= 1
+        sizes[to] += 1
+        labels[robot] = to
+        common[:, own] -= S[robot]
+        common[:, to] += S[robot]
 
 
-def _means(S: Floats, labels: NDArray[np.intp], m: int) -> Floats:
-    """Mean similarity (N, m) of every robot to the members of each group, itself left out."""
-    member = (labels[:, None] == np.arange(m)).astype(np.float64)
-    own = member * np.diag(S)[:, None]
-    result: Floats = (S @ member - own) / np.maximum(member.sum(axis=0) - member, 1.0)
-    return result
+@compiled
+def _in_common(S: Floats, labels: Labels) -> tuple[Floats, NDArray[np.intp]]:
+    """What each robot has in common with the members of each group (N, m), itself included; and the groups' sizes."""
+    m = labels.max() + 1
+    common, sizes = np.zeros((len(S), m)), np.zeros(m, np.intp)
+    for i in range(len(S)):
+        sizes[labels[i]] += 1
+        for j in range(len(S)):
+            common[i, labels[j]] += S[i, j]
+    return common, sizes
+
+
+@compiled
+def _smallest(sizes: NDArray[np.intp]) -> int:
+    """The size of the smallest group that is not empty."""
+    smallest: int = sizes.max()
+    for size in sizes:
+        if 0 < size < smallest:
+            smallest = size
+    return smallest
