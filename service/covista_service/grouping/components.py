@@ -26,8 +26,10 @@ def components(S: Floats, threshold: float, bounds: Bounds) -> Labels:
     numbers = bounds.numbers(count)
     # Whoever hangs together over links at least that strong does so along the strongest tree.
     tree = minimum_spanning_tree(np.triu(_DEAREST - S, 1)).tocoo()
-    order = np.lexsort((tree.col, tree.row, tree.data))
-    links = int(np.count_nonzero(_DEAREST - tree.data > threshold))
+    # Not by their cost: taking it from the dearest loses a digit, and equals would pass the threshold.
+    strength = S[tree.row, tree.col]
+    order = np.lexsort((tree.col, tree.row, -strength))
+    links = int(np.count_nonzero(strength > threshold))
     links = min(max(links, count - numbers[-1]), count - numbers[0])
     kept = order[:links]
     linked = np.zeros((count, count))
