@@ -87,8 +87,8 @@ def candidates(count: int, options: SelectionOptions) -> range:
 def choose(S: Floats, options: SelectionOptions, start: Labels | None = None) -> Choice:
     """Part the robots of a similarity matrix (N, N) into the number of groups with the highest score.
 
-    Ties go to the smaller number. No robots have no groups and no scores. `start` (N,) are labels that gain begins
-    with. Raises ValueError for a matrix that is not symmetric, from 0 to 1 and 1 on its diagonal, and for bounds that
+    Ties go to the smaller number; by gain they move nobody. No robots have no groups and no scores. `start` (N,) are
+    labels from 0 to N - 1 that gain begins with. Raises ValueError for a matrix that is not symmetric, from 0 to 1 and 1 on its diagonal, and for bounds that
     no grouping satisfies.
     """
     _check(S)
@@ -171,7 +171,7 @@ def _adaptive(S: Floats, options: SelectionOptions, numbers: range) -> Choice:
     if options.min_group_size > 1:
         found: _Found = {}
         merged = (ladder.at(m) for ladder in ladders for m in ladder.numbers if m in numbers)
-        _compare(found, (_sized(S, labels, options) for labels in merged), contributions(S, options))
+        _compare(found, (_sized(S, labels, options, numbers) for labels in merged), contributions(S, options))
         return _best_of(found)
     told = {m: score for ladder in ladders for m, score in ladder.scores(S, options.stranger).items() if m in numbers}
     best = _highest(told)
@@ -209,7 +209,7 @@ def _by_score(S: Floats, options: SelectionOptions, numbers: range) -> Choice:
     found: _Found = {}
     nearby = looked_at
     while nearby:
-        _compare(found, (_sized(S, partition(spectrum, m), options) for m in nearby), score_of)
+        _compare(found, (_sized(S, partition(spectrum, m), options, numbers) for m in nearby), score_of)
         nearby = _about(_highest(_told(found)), looked_at)
         looked_at = sorted({*looked_at, *nearby})
     return _best_of(found)
@@ -220,7 +220,7 @@ def _by_eigengap(S: Floats, options: SelectionOptions, numbers: range) -> Choice
     spectrum = Spectrum.of(S)
     gaps = -np.diff(np.append(np.maximum(spectrum.values, 0.0), 0.0))
     told = {m: float(gaps[m - 1]) for m in numbers}
-    labels = _sized(S, partition(spectrum, _highest(told)), options)
+    labels = _sized(S, partition(spectrum, _highest(told)), options, numbers)
     return Choice(canonical(labels, len(S)), tuple(told.items()))
 
 
@@ -230,7 +230,7 @@ def _by_gain(S: Floats, options: SelectionOptions, numbers: range, start: Labels
     labels = moves.settle(S, expected, np.arange(len(S)) if start is None else canonical(start, len(S)))
     if labels.max() + 1 < numbers.start:
         labels = partition(Spectrum.of(S, numbers.start), numbers.start)
-    labels = canonical(_sized(S, labels, options), len(S))
+    labels = canonical(_sized(S, labels, options, numbers), len(S))
     formed = int(labels.max()) + 1
     least = max(numbers.start, min(numbers[-1], int(_TOLD_SHARE * formed)))
     steps, gains = merging.merge_down(S, expected, labels, least)
@@ -280,8 +280,8 @@ def _about(best: int, looked_at: list[int]) -> list[int]:
     return sorted(halfway - set(looked_at))
 
 
-def _sized(S: Floats, labels: Labels, options: SelectionOptions) -> Labels:
-    """Groups as large as they must be at least."""
+def _sized(S: Floats, labels: Labels, options: SelectionOptions, numbers: range) -> Labels:
+    """Groups as large as they must be at least, and not fewer than there may be."""
     if options.min_group_size == 1:
         return labels
-    return with_least_size(S, labels, options.min_group_size, options.bounds.least)
+    return with_least_size(S, labels, options.min_group_size, numbers.start)
