@@ -88,8 +88,8 @@ def choose(S: Floats, options: SelectionOptions, start: Labels | None = None) ->
     """Part the robots of a similarity matrix (N, N) into the number of groups with the highest score.
 
     Ties go to the smaller number; by gain they move nobody. No robots have no groups and no scores. `start` (N,) are
-    labels from 0 to N - 1 that gain begins with. Raises ValueError for a matrix that is not symmetric, from 0 to 1 and 1 on its diagonal, and for bounds that
-    no grouping satisfies.
+    labels from 0 to N - 1 that gain begins with. Raises ValueError for a matrix that is not symmetric, from 0 to 1 and
+    1 on its diagonal, and for bounds that no grouping satisfies.
     """
     _check(S)
     if not len(S):
@@ -127,8 +127,9 @@ def _check(S: Floats) -> None:
         raise ValueError(f"a similarity matrix is square, not {S.shape}")
     if _sound(S):
         return
-    if not np.isfinite(S).all():
-        i, j = np.argwhere(~np.isfinite(S))[0].tolist()
+    astray = np.argwhere(~np.isfinite(S))
+    if len(astray):
+        i, j = astray[0].tolist()
         raise ValueError(f"similarities are finite, that of rows {i} and {j} is {S[i, j]}")
     raise ValueError("a similarity matrix is symmetric, lies from 0 to 1, and is 1 on its diagonal")
 
