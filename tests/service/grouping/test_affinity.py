@@ -226,7 +226,7 @@ class Swarm(RuleBasedStateMachine):
 
 
 TestSwarm = Swarm.TestCase
-TestSwarm.settings = settings(max_examples=8, stateful_step_count=200, deadline=None)
+TestSwarm.settings = settings(max_examples=6, stateful_step_count=200, deadline=None)
 
 
 def row(*along_m: float, smoothing: float = 1.0) -> Affinity:
