@@ -87,7 +87,8 @@ def after(labels: Labels, steps: NDArray[np.intp]) -> Labels:
 def silhouettes(S: Floats, labels: Labels, steps: NDArray[np.intp], stranger: float) -> Floats:
     """The silhouette (`scores.silhouette`) of groups, and after each step: (steps + 1,).
 
-    After a step only robots are looked at anew whose own group or next best group has changed.
+    After a step only robots are looked at anew whose own group or next best group has changed: to the others the merged
+    group means no more than the better of the two did.
     """
     count, m = len(S), labels.max() + 1
     own, size = labels.copy(), np.zeros(m)
@@ -113,11 +114,7 @@ def silhouettes(S: Floats, labels: Labels, steps: NDArray[np.intp], stranger: fl
                 own[i] = a
             if own[i] == a or other[i] == a or other[i] == b:
                 _next_best(sums, own, size, left, i, other, most)
-            elif sums[i, a] > most[i] * size[a]:
-                other[i], most[i] = a, sums[i, a] / size[a]
-            else:
-                continue
-            value[i] = _silhouette(sums[i, own[i]], most[i], size[own[i]], stranger)
+                value[i] = _silhouette(sums[i, own[i]], most[i], size[own[i]], stranger)
         told[step + 1] = value.mean()
     return told
 

@@ -118,6 +118,16 @@ def test_a_group_that_would_be_empty_takes_the_row_that_fits_worst() -> None:
     np.testing.assert_array_equal(k_means(rows, 2, every(4)), [0, 0, 1, 0])
 
 
+def test_a_group_of_one_row_is_not_robbed() -> None:
+    # From the first row, seeds are it and its neighbours, all alike: two of their groups are empty, and one robot is
+    # to spare beside the first.
+    first, second = np.eye(2, 4)
+    rows = np.array([first, second, second, second, -second])
+    labels = k_means(rows, 4, np.zeros(1, np.intp))
+    assert sorted(set(labels.tolist())) == [0, 1, 2, 3]
+    assert labels[4] not in labels[:4]
+
+
 @given(labels=st.lists(st.integers(0, 9), max_size=20))
 def test_labels_become_canonical_in_the_order_of_first_robots(labels: list[int]) -> None:
     renamed = canonical(np.array(labels, np.intp), 10).tolist()
