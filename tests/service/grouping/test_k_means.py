@@ -125,6 +125,7 @@ def test_a_group_of_one_row_is_not_robbed() -> None:
     rows = np.array([first, second, second, second, -second])
     labels = k_means(rows, 4, np.zeros(1, np.intp))
     assert sorted(set(labels.tolist())) == [0, 1, 2, 3]
+    assert labels[0] not in labels[1:]
     assert labels[4] not in labels[:4]
 
 

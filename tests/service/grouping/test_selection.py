@@ -5,6 +5,7 @@ from typing import get_args
 import numpy as np
 import pytest
 from covista_service.grouping import scores
+from covista_service.grouping.bounds import with_least_size
 from covista_service.grouping.k_means import canonical
 from covista_service.grouping.selection import (
     FINE,
@@ -20,6 +21,7 @@ from covista_service.grouping.selection import (
     contributions,
 )
 from covista_service.grouping.similarity import matrix
+from covista_service.grouping.spectral import Spectrum, partition
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -246,6 +248,27 @@ def test_a_tie_goes_to_the_smaller_number_and_moves_nobody(criterion: Criterion)
     told = dict(choice.scores)
     best = max(told.values())
     assert formed(choice) == min(m for m, score in told.items() if score > best - 1e-9)
+
+
+@pytest.mark.parametrize("criterion", ["adaptive", "silhouette"])
+@pytest.mark.parametrize("weight", [0.1, 0.3, 0.7])
+@pytest.mark.parametrize("count", [3, 6, 7, 11])
+def test_scores_that_differ_by_rounding_are_a_tie(criterion: Criterion, weight: float, count: int) -> None:
+    assert formed(choose(alike(count, weight), SelectionOptions(criterion=criterion, stranger=weight))) == 1
+
+
+@given(seed=seeds, count=st.integers(2, 14), kind=kinds, criterion=st.sampled_from(["silhouette", "fiedler"]))
+@settings(deadline=None)
+def test_of_groups_that_become_as_many_by_their_size_the_best_count(seed: int, count: int, kind, criterion) -> None:
+    S, options = kind(seed, count), SelectionOptions(criterion=criterion, min_group_size=2)
+    best: dict[int, float] = {}
+    for m in candidates(count, options):
+        labels = with_least_size(S, partition(Spectrum.of(S), m), 2, 1)
+        sized, score = int(labels.max()) + 1, float(contributions(S, options)(labels).sum())
+        best[sized] = max(score, best.get(sized, -np.inf))
+    told = dict(choose(S, options).scores)
+    assert told.keys() == best.keys()
+    np.testing.assert_allclose([told[m] for m in best], list(best.values()), rtol=0, atol=1e-12)
 
 
 @by_criterion
