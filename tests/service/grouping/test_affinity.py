@@ -60,13 +60,14 @@ def chained(mutual: Floats) -> Floats:
 
     NaN where there is none.
     """
-    result = mutual.copy()
-    for i, j in np.argwhere(np.isnan(mutual)).tolist():
-        first, second = mutual[i], mutual[j]
-        with np.errstate(invalid="ignore"):
-            links = (np.maximum(first, second) > 0.25) & ~np.isnan(first * second)
-        links[[i, j]] = False
-        result[i, j] = (first * second)[links].max() if links.any() else np.nan
+    result, others = mutual.copy(), np.arange(len(mutual))
+    for i, own in enumerate(mutual):
+        # Row j, column k: the two steps from i over k to j.
+        passed_on = own * mutual
+        told = (np.fmax(own, mutual) > 0.25) & ~np.isnan(passed_on)
+        told[:, i] = told[others, others] = False
+        best = np.where(told, passed_on, -1.0).max(axis=1)
+        result[i] = np.where(np.isnan(own), np.where(best >= 0, best, np.nan), own)
     return result
 
 

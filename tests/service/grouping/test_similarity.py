@@ -179,6 +179,22 @@ def test_what_is_unknown_is_what_the_best_chain_passes_on(mutual: Floats, q: flo
     assert S[0, 1] == pytest.approx(near if q is None else 0.6 * q + 0.4 * near)
 
 
+@pytest.mark.parametrize("count", [5, 30, 60])
+@pytest.mark.parametrize("known", [0.1, 0.5, 0.9])
+@pytest.mark.parametrize("most", [0.3, 1.0])
+def test_every_chain_counts_of_few_and_of_many(count: int, known: float, most: float) -> None:
+    rng = np.random.default_rng(count)
+    mutual = np.where(rng.uniform(size=(count, count)) < known, rng.uniform(0, most, (count, count)), np.nan)
+    mutual = np.tril(mutual, -1) + np.tril(mutual, -1).T
+    np.fill_diagonal(mutual, 1.0)
+    S = similarity(mutual, np.ones((count, count)), 1.0, 1.0)
+    for i, j in zip(*np.tril_indices(count, -1), strict=True):
+        steps = [(mutual[i, k], mutual[k, j]) for k in range(count) if k not in (i, j)]
+        chains = [a * b for a, b in steps if not math.isnan(a * b) and max(a, b) > 0.25]
+        best = max(chains, default=math.exp(-1))
+        assert S[i, j] == pytest.approx(best if math.isnan(mutual[i, j]) else mutual[i, j])
+
+
 @given(seed=seeds, count=counts, alpha=st.floats(0, 1))
 def test_eq_16_mixes_overlap_and_closeness(seed: int, count: int, alpha: float) -> None:
     position_m, overlap = swarm(seed, count, known=1.0)

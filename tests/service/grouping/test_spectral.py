@@ -154,6 +154,11 @@ def test_a_number_of_groups_that_cannot_be_is_refused(m: int) -> None:
         labels_of(np.eye(3), m)
 
 
+def test_more_groups_than_eigenvectors_serve_are_refused() -> None:
+    with pytest.raises(ValueError, match="these eigenvectors serve up to 3 groups, not 4"):
+        partition(Spectrum.of(scattered(1, PARTIAL_FROM), 3), 4)
+
+
 @pytest.mark.parametrize("S", [np.zeros((0, 0)), np.zeros((2, 3)), np.zeros(4)])
 def test_what_is_not_a_matrix_of_robots_is_refused(S: Floats) -> None:
     with pytest.raises(ValueError, match="square and not empty"):
