@@ -27,4 +27,4 @@ def warm_up() -> None:
     S = affinity.similarity(0.5)
     for criterion in get_args(Criterion):
         choose(S, SelectionOptions(criterion=criterion), np.zeros(len(S), np.intp))
-    choose(S, SelectionOptions(2))
+    choose(S, SelectionOptions(2, min_group_size=2))
