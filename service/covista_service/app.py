@@ -15,6 +15,7 @@ from covista_service.api import rest
 from covista_service.api.deps import Parts, State
 from covista_service.config import Settings
 from covista_service.grouping.hysteresis import HysteresisOptions
+from covista_service.grouping.warming import warm_up
 from covista_service.link.inbox import Inbox
 from covista_service.link.ingest import Ingest
 from covista_service.link.mailbox import Mailboxes
@@ -73,7 +74,7 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
             telemetry,
             next_event=history.last.event + 1,
         )
-        task = asyncio.create_task(loop.run(), name="covista-loop")
+        task = asyncio.create_task(_run(loop), name="covista-loop")
         stack.push_async_callback(_end, task)
         close_later(Queries(session, settings.site, loop.ask).close)
         link = PartHealth(status="ready", detail=", ".join((*settings.link, *settings.connect)))
@@ -84,6 +85,12 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
             return _health({"link": link, **moving})
 
         yield Parts(loop, telemetry, health_now, lambda: mailboxes.turned_away, secrets.token_hex(4))
+
+
+async def _run(loop: Loop) -> None:
+    """Run the loop once it can group: where code has to be compiled first, everybody else must not wait for it."""
+    await asyncio.to_thread(warm_up)
+    await loop.run()
 
 
 async def _end(task: asyncio.Task[None]) -> None:

@@ -60,9 +60,10 @@ class Workers:
         # waits. Threads share what one of them has loaded.
         self._here = ThreadPoolExecutor(1, "covista-loading")
         if options.kind == "threads":
-            self._warming = [self._submit(load)]
+            self._warming = [self._submit(warm_up)]
         else:
-            self._warming = [self._here.submit(load), *(self._submit(warm_up) for _ in range(options.count))]
+            # Overlaps are read in this process.
+            self._warming = [self._here.submit(warm_up), *(self._submit(warm_up) for _ in range(options.count))]
         for one in self._warming:
             one.add_done_callback(_tell_failure)
 
@@ -123,7 +124,7 @@ def _tell_failure(warming: Future[None]) -> None:
 
 
 def load() -> None:
-    """Load all compiled code into this process: that of workers, and that of the loop which groups and reads."""
+    """Load all compiled code into this process, or compile what is not on disk yet: for who installs the station."""
     grouping_warming.warm_up()
     warm_up()
 

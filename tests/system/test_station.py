@@ -66,6 +66,8 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     with running_station(settings_for(tmp_path_factory.mktemp("station"))) as station:
         air = zenoh.open(config("client", connect=[station.link[0]]))
         with MissionControl(station.url) as control:
+            # Compiled code is loaded; on a fresh machine it is compiled first.
+            wait_until(lambda: control.health().status == "ready", "the station is ready", deadline_s=100)
             yield Site(station, control, air)
         air.close()
 
