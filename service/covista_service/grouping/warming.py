@@ -8,6 +8,7 @@ from typing import get_args
 import numpy as np
 
 from covista_service.grouping.affinity import Affinity
+from covista_service.grouping.hysteresis import held
 from covista_service.grouping.selection import Criterion, SelectionOptions, choose
 
 
@@ -27,4 +28,5 @@ def warm_up() -> None:
     S = affinity.similarity(0.5)
     for criterion in get_args(Criterion):
         choose(S, SelectionOptions(criterion=criterion), np.zeros(len(S), np.intp))
-    choose(S, SelectionOptions(2, min_group_size=2))
+    choice = choose(S, SelectionOptions(2, min_group_size=2))
+    held(S, choice.labels, 0.05)

@@ -4,27 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import cv2
 import numpy as np
 import pytest
 from covista_service.drawing.plots import COLOURS
 from covista_service.drawing.scenario import Stage, Standing, from_above, perspective
-from numpy.typing import NDArray
+
+from tests.service.drawing.pixels import drawn, pixels_of
 
 OUTLINE_M = np.array([(0.0, 0.0), (8.0, 0.0), (8.0, 6.0), (0.0, 6.0)])
-
-
-def drawn(data: bytes) -> NDArray[np.uint8]:
-    assert data.startswith(b"\x89PNG")
-    found = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
-    assert found is not None
-    return np.asarray(found, np.uint8)
-
-
-def pixels_of(picture: NDArray[np.uint8], colour: str) -> int:
-    """How many pixels have this colour (#rrggbb), nearly."""
-    rgb = [int(colour[k : k + 2], 16) for k in (1, 3, 5)]
-    return int((np.abs(picture[..., ::-1].astype(int) - rgb).max(axis=2) < 12).sum())
 
 
 def standing(label: str, x: float, group: int) -> Standing:

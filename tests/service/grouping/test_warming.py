@@ -1,30 +1,17 @@
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
 
-ROOT = Path(__file__).parents[3]
+from tests.service.warmed import compiled
 
-_AFTERWARDS = """
-import sys
+_IMPORTS = """
 from typing import get_args
 import numpy as np
 from covista_service.grouping.affinity import Affinity
 from covista_service.grouping.bounds import Bounds
 from covista_service.grouping.components import components
+from covista_service.grouping.hysteresis import held
 from covista_service.grouping.selection import Criterion, SelectionOptions, choose, contributions
-from covista_service.grouping.warming import warm_up
-from numba.core.registry import CPUDispatcher
-
-def compiled():
-    ours = [module for name, module in sys.modules.items() if name.startswith("covista_service.grouping.")]
-    found = {id(each): each for module in ours for each in vars(module).values() if isinstance(each, CPUDispatcher)}
-    return sum(len(each.signatures) for each in found.values())
-
-warm_up()
-warm = compiled()
-
+"""
+_AFTERWARDS = """
 rng = np.random.default_rng(0)
 affinity = Affinity(0.3)
 for number in range(40):
@@ -41,16 +28,11 @@ for criterion in get_args(Criterion):
         contributions(S, options)(choice.labels)
         choose(S, options, choice.labels)
 components(S, 0.5, Bounds("auto", 2))
-print(warm, compiled())
+held(S, choice.labels, 0.05)
 """
 
 
-# On a fresh machine the compiler is most of it.
 @pytest.mark.timeout(300)
 def test_after_warming_up_nothing_is_compiled() -> None:
-    said = subprocess.run(
-        [sys.executable, "-c", _AFTERWARDS], cwd=ROOT, capture_output=True, text=True, timeout=290, check=False
-    )
-    assert said.returncode == 0, said.stderr
-    warm, afterwards = map(int, said.stdout.split())
+    warm, afterwards = compiled("grouping", _IMPORTS, _AFTERWARDS)
     assert 0 < warm == afterwards
