@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import secrets
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
@@ -29,6 +30,8 @@ from covista_service.store.database import check_url
 from covista_service.store.history import History
 from covista_service.telemetry import Telemetry
 from covista_service.workers import Workers, WorkersOptions
+
+log = logging.getLogger(__name__)
 
 # The loop turns four times a second; when it does not for so long, something blocks it.
 _SILENT_S = 2.0
@@ -89,7 +92,10 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
 
 async def _run(loop: Loop) -> None:
     """Run the loop once it can group: where code has to be compiled first, everybody else must not wait for it."""
-    await asyncio.to_thread(warm_up)
+    try:
+        await asyncio.to_thread(warm_up)
+    except Exception:
+        log.warning("compiled code could not be loaded ahead; the first groups will wait for it", exc_info=True)
     await loop.run()
 
 
@@ -109,6 +115,8 @@ def _crew_health(workers: Workers, kind: str) -> PartHealth:
 def _loop_health(loop: Loop, task: asyncio.Task[None]) -> PartHealth:
     if task.done():
         return PartHealth(status="stopping", detail="the loop has ended")
+    if not loop.running:
+        return PartHealth(status="starting", detail="loading compiled code")
     silent_s = loop.silent_s()
     if silent_s > _SILENT_S:
         return PartHealth(status="degraded", detail=f"no turn for {silent_s:.1f} s")
@@ -141,12 +149,12 @@ def _grouping_options(live: LiveSettings) -> GroupingOptions:
     groups = live.groups
     bounds = (groups.min, groups.max) if isinstance(groups, GroupBounds) else groups
     return GroupingOptions(
-        live.alpha,
-        bounds,
-        live.min_group_size,
-        live.sigma,
-        live.criterion,
-        live.grouping,
-        HysteresisOptions(live.hysteresis.gain, live.hysteresis.persistence_s),
-        live.hysteresis.smoothing,
+        alpha=live.alpha,
+        groups=bounds,
+        min_group_size=live.min_group_size,
+        sigma=live.sigma,
+        criterion=live.criterion,
+        grouping=live.grouping,
+        hysteresis=HysteresisOptions(live.hysteresis.gain, live.hysteresis.persistence_s),
+        smoothing=live.hysteresis.smoothing,
     )

@@ -177,6 +177,11 @@ class Loop:
             raise TimeoutError("the station has ended") from error
         return answer.result(timeout_s)
 
+    @property
+    def running(self) -> bool:
+        """Has it begun?"""
+        return self._asyncio is not None
+
     def silent_s(self) -> float:
         """Seconds since the last turn."""
         return (self._clock() - self._turned_ns) / _NS_PER_S

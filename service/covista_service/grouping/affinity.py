@@ -29,18 +29,32 @@ class Affinity:
     blocks of 32 columns. News of a robot sums up afresh its own row and, in all other rows, the one block that it
     stands in: nothing is ever added to or taken from a sum, so no error can gather, however long a swarm lives.
 
-    `smoothing` is the weight of a pair's newest overlap in what similarity is made from; 1 takes each as it comes.
+    `smoothing` is the weight of a pair's newest overlap in what similarity is made from; 1 takes each as it comes, and
+    forgets what was before.
     """
 
     def __init__(self, smoothing: float = 1.0) -> None:
-        self.smoothing = smoothing
+        self._smoothing = smoothing
         self._slot: dict[str, int] = {}
         self._position_m = np.zeros((_FIRST_ROOM, 3))
         # Beyond the last slot all is 0, so that blocks can be summed up whole.
         self._squared_m2 = np.zeros((_FIRST_ROOM, _FIRST_ROOM))
         self._overlap = np.full((_FIRST_ROOM, _FIRST_ROOM), np.nan)
         self._mutual = np.full((_FIRST_ROOM, _FIRST_ROOM), np.nan)
+        # Pairs whose mutual overlap rests on one measurement.
+        self._once = np.zeros((_FIRST_ROOM, _FIRST_ROOM), np.bool_)
         self._sums_m = np.zeros((_FIRST_ROOM, _blocks(_FIRST_ROOM), 2))
+
+    @property
+    def smoothing(self) -> float:
+        """Weight of a pair's newest overlap."""
+        return self._smoothing
+
+    @smoothing.setter
+    def smoothing(self, weight: float) -> None:
+        self._smoothing = weight
+        if weight == 1:
+            self._mutual = (self._overlap + self._overlap.T) / 2
 
     @property
     def robots(self) -> tuple[str, ...]:
@@ -65,6 +79,7 @@ class Affinity:
         for matrix in (self._overlap, self._mutual):
             matrix[slot, : slot + 1] = matrix[: slot + 1, slot] = np.nan
             matrix[slot, slot] = 1.0
+        self._once[slot] = self._once[:, slot] = False
         self._put(slot, place)
 
     def remove(self, robot: str) -> None:
@@ -74,7 +89,7 @@ class Affinity:
         if slot != last:
             self._slot[next(name for name, held in self._slot.items() if held == last)] = slot
             self._position_m[slot] = self._position_m[last]
-            for matrix in (self._overlap, self._mutual):
+            for matrix in (self._overlap, self._mutual, self._once):
                 corner = matrix[last, last]
                 matrix[slot, :last] = matrix[last, :last]
                 matrix[:last, slot] = matrix[:last, last]
@@ -88,9 +103,10 @@ class Affinity:
         """Set a robot's position (3,) in metres; ValueError where it is not three finite numbers below 10^12."""
         self._put(self._slot[robot], _checked(robot, position_m))
 
-    def see(self, a: str, b: str, q_a: float | None, q_b: float | None) -> None:
+    def see(self, a: str, b: str, q_a: float | None, q_b: float | None, *, again: bool = False) -> None:
         """Set the share `q_a` of a's image that b sees, and `q_b` of b's that a sees; None where unknown.
 
+        `again`: the same two pictures as before, read anew. They take the place of the last reading.
         Raises ValueError for a robot and itself, and for a share that is none.
         """
         i, j = self._slot[a], self._slot[b]
@@ -101,12 +117,15 @@ class Affinity:
                 raise ValueError(f"a share lies from 0 to 1, that of {a} and {b} does not: {q}")
         # Numbers of Python's own: an array's cost three times as much here.
         seen, seeing = (math.nan if q is None else float(q) for q in (q_a, q_b))
+        former = (self._overlap.item(i, j) + self._overlap.item(j, i)) / 2
         self._overlap[i, j], self._overlap[j, i] = seen, seeing
-        mutual = (seen + seeing) / 2
-        if self.smoothing != 1:
-            smoothed = self._mutual.item(i, j) + self.smoothing * (mutual - self._mutual.item(i, j))
-            # NaN in the one or the other: there is nothing to smooth.
-            mutual = mutual if math.isnan(smoothed) else smoothed
+        mutual, held = (seen + seeing) / 2, self._mutual.item(i, j)
+        # NaN in the one or the other: there is nothing to smooth.
+        fresh = math.isnan(held + mutual)
+        if self._smoothing != 1 and not fresh and not (again and self._once[i, j]):
+            held += self._smoothing * (mutual - (former if again else held))
+            mutual = min(max(held, 0.0), 1.0)
+        self._once[i, j] = self._once[j, i] = fresh or (again and bool(self._once[i, j]))
         self._mutual[i, j] = self._mutual[j, i] = mutual
 
     @property
@@ -167,7 +186,7 @@ class Affinity:
             return
         self._slot = {robot: slot for slot, robot in enumerate(self.robots)}
         self._position_m[:count] = self._position_m[order]
-        for matrix in (self._squared_m2, self._overlap, self._mutual):
+        for matrix in (self._squared_m2, self._overlap, self._mutual, self._once):
             matrix[:count, :count] = matrix[np.ix_(order, order)]
         for block in range(_blocks(count)):
             _sum_block(self._squared_m2, block, self._sums_m)
@@ -175,7 +194,7 @@ class Affinity:
     def _make_room(self, room: int) -> None:
         old = len(self._position_m)
         self._position_m = np.concatenate([self._position_m, np.zeros((room - old, 3))])
-        for name, fill in (("_squared_m2", 0.0), ("_overlap", np.nan), ("_mutual", np.nan)):
+        for name, fill in (("_squared_m2", 0.0), ("_overlap", np.nan), ("_mutual", np.nan), ("_once", False)):
             larger = np.full((room, room), fill)
             larger[:old, :old] = getattr(self, name)
             setattr(self, name, larger)

@@ -7,7 +7,7 @@ send robots to and fro between groups that are about equally good.
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,11 +18,10 @@ from scipy.sparse.csgraph import connected_components
 
 from covista_service.compiled import compiled
 from covista_service.grouping.continuity import Grouping, Members
+from covista_service.grouping.scores import Contributions
 from covista_service.grouping.similarity import Floats
 
 _Labels = NDArray[np.intp]
-# What each robot adds (N,) to the score of a grouping with labels (N,) from 0 to M - 1.
-Contributions = Callable[[_Labels], Floats]
 _Rows = NDArray[np.intp]
 _NS_PER_S = 1_000_000_000
 # Gains up to this share are rounding.
@@ -38,8 +37,8 @@ class HysteresisOptions:
     for long enough. A gain is clear if every robot that moves brings more than `clear` times what a robot contributes
     on average. By 1 a robot that is found in another place altogether moves at once, and one on the verge waits.
 
-    `persistence_s` outlasts a few keyframes, which come about once a second: noise that is new with each of them goes
-    one way five times running in 1 of 32 cases, and who drives from group to group is between them for longer.
+    `persistence_s` outlasts a few keyframes, which come about once a second: noise seldom goes one way
+    for five of them, and who drives from group to group is between them for longer.
     Evaluations may come ten times as often, but from the same keyframes. Of 3 s a flickering pair passes often, 8 s
     leave a robot for as long in a group that it has left, and spare little more.
     """
@@ -85,14 +84,13 @@ def weigh(
     now_ns: int,
     options: HysteresisOptions,
     pending: Iterable[Pending] = (),
-    typical: float = 0.0,
 ) -> Standing:
     """Weigh the groups that are proposed, `labels` (N,) of `robots`, against those that are `shown`.
 
     Who has left is dropped and who is new joins, at once. What else differs falls into changes that have no group in
-    common, and each is judged by itself: the size of the swarm has no say in it. `contributions` is asked only if there
-    is such a change. `typical`, in their unit, is what a robot contributes on average if the swarm tells less: a few
-    robots that might all as well be alone have no measure of their own for a gain.
+    common, and each is judged by itself: where a score is a sum over groups, the size of the swarm has no say in it. (A
+    mean over groups, as Eq. 17 is, changes with their number for all.) `contributions` is asked only if there is such a
+    change.
 
     Raises ValueError where robots and labels do not fit.
     """
@@ -104,7 +102,7 @@ def weigh(
     stayed = frozenset(robots) & frozenset().union(*shown.values())
     since_ns = {_among(each, stayed): each.since_ns for each in pending}
     before = contributions(base)
-    average = max(float(np.abs(before).mean()), typical)
+    average = float(np.abs(before).mean())
     result, waiting = base.copy(), list[Pending]()
     for rows in changes:
         first = Pending(_groups(robots, base, rows), _groups(robots, proposed, rows), now_ns)

@@ -7,7 +7,7 @@ the score of the grouping is the sum. Measures are functions of which robots sta
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ from covista_service.grouping.k_means import Labels
 from covista_service.grouping.similarity import Floats
 
 Members = tuple[int, ...]
+# What each robot adds (N,) to the score of a grouping with labels (N,) from 0 to M - 1.
+Contributions = Callable[[Labels], Floats]
 # Scores closer than this are a tie.
 _ROUNDING = 1e-12
 

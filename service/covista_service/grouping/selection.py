@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -13,12 +13,11 @@ from covista_service.compiled import compiled
 from covista_service.grouping import merging, moves, scores
 from covista_service.grouping.bounds import Bounds, Groups, with_least_size
 from covista_service.grouping.k_means import Labels, canonical
-from covista_service.grouping.scores import outsider
+from covista_service.grouping.scores import Contributions, outsider
 from covista_service.grouping.similarity import Floats
 from covista_service.grouping.spectral import Spectrum, partition
 
 Criterion = Literal["adaptive", "silhouette", "gain", "fiedler", "paper", "eigengap", "modularity"]
-Contributions = Callable[[Labels], Floats]
 _Found = dict[int, tuple[float, Labels]]
 # A pair inside a group must be worth this share of what its robots find with their best companions: by the criterion
 # gain, and where adaptive begins (finer) and merges.

@@ -7,6 +7,7 @@ from typing import get_args
 
 import numpy as np
 
+from covista_service.grouping import similarity
 from covista_service.grouping.affinity import Affinity
 from covista_service.grouping.hysteresis import held
 from covista_service.grouping.selection import Criterion, SelectionOptions, choose
@@ -16,8 +17,11 @@ from covista_service.grouping.selection import Criterion, SelectionOptions, choo
 def warm_up() -> None:
     """Compile what no earlier process has left in numba's cache, and load the rest; once per process.
 
-    Six robots, some of whose overlaps are unknown, are grouped by every criterion.
+    Robots, some of whose overlaps are unknown, are grouped by every criterion. An affinity reads parts of its matrices,
+    or whole ones when its room is full, as it is with one robot: those are other functions to the compiler.
     """
+    two = np.eye(2)
+    similarity.matrix(1 - two, two, 0.5, "shared")
     affinity = Affinity()
     for number in range(6):
         affinity.add(f"r{number}", (number % 3, 20.0 * (number // 3), 0.0))

@@ -20,6 +20,8 @@ from covista_service.station.snapshot import GroupsView, GroupView, Reason, Simi
 
 # Keyframes that come together are evaluated together.
 _APART_S = 0.02
+# An evaluation looks at all pairs: in a large swarm the next one comes so much later for each robot.
+_APART_PER_ROBOT_NS = 200_000
 Ungrouped = tuple[tuple[str, Reason], ...]
 
 
@@ -70,21 +72,30 @@ class Groups:
             self._affinity.remove(robot)
             self._news = True
 
-    def see(self, pair: Pair, overlaps: tuple[float, float] | None) -> None:
-        """Set a pair's overlaps, None where unknown; nothing happens while one of the two takes no part."""
+    def see(self, pair: Pair, overlaps: tuple[float, float] | None, *, again: bool = False) -> None:
+        """Set a pair's overlaps, None where unknown; nothing happens while one of the two takes no part.
+
+        `again`: read anew from the same keyframes.
+        """
         if pair[0] in self._affinity and pair[1] in self._affinity:
-            self._affinity.see(*pair, *(overlaps or (None, None)))
+            self._affinity.see(*pair, *(overlaps or (None, None)), again=again)
             self._drift = True
 
     def set_options(self, options: GroupingOptions) -> None:
         """Group by other settings from the next evaluation on."""
+        before = self.view.settings
         self.view = replace(self.view, settings=options)
         self._affinity.smoothing = options.smoothing
-        self._news = self._set_anew = True
+        self._news = True
+        # How steady groups are does not say which groups there should be.
+        self._set_anew |= replace(before, hysteresis=options.hysteresis, smoothing=options.smoothing) != options
 
     def may_evaluate(self, now_ns: int) -> bool:
         """Is the last evaluation over for long enough that news of a keyframe need not wait for that of others?"""
-        return not 0 <= now_ns - self._evaluated_ns < self._apart_ns
+        return not 0 <= now_ns - self._evaluated_ns < self._spaced_ns(self._apart_ns)
+
+    def _spaced_ns(self, least_ns: int) -> int:
+        return max(least_ns, _APART_PER_ROBOT_NS * len(self._affinity)) if least_ns else 0
 
     def evaluate(self, ungrouped: Ungrouped, now_ns: int, *, at_once: bool) -> list[Effect]:
         """Bring similarity and groups up to date if there is news; a new revision only if someone stands elsewhere.
@@ -92,13 +103,13 @@ class Groups:
         `at_once` does not let drift wait.
         """
         # A clock that was set back must not make drift wait until it is where it was.
-        recent = 0 <= now_ns - self._evaluated_ns < self._regroup_after_ns
+        recent = 0 <= now_ns - self._evaluated_ns < self._spaced_ns(self._regroup_after_ns)
         drifted = self._drift and (at_once or not recent)
         effects: list[Effect] = []
         if self._news or drifted or self._pending_is_due(now_ns):
             noted = self.view.note
             members = self._regroup(now_ns)
-            if self.view.note not in {None, noted}:
+            if self.view.note is not None and (noted is None or self._set_anew):
                 effects.append(Happened(EventKind.WARNING, now_ns, f"groups: {self.view.note}"))
             self._news = self._drift = self._set_anew = False
             self._evaluated_ns = now_ns
@@ -114,8 +125,12 @@ class Groups:
         return effects + self._tell(members, now_ns)
 
     def _pending_is_due(self, now_ns: int) -> bool:
+        """Has the time of a change come since the last evaluation, or a clock been set back under it?"""
         after_ns = nanoseconds(self.view.settings.hysteresis.persistence_s)
-        return any(now_ns - change.since_ns >= after_ns for change in self._pending)
+        return any(
+            now_ns < change.since_ns or self._evaluated_ns < change.since_ns + after_ns <= now_ns
+            for change in self._pending
+        )
 
     def _regroup(self, now_ns: int) -> dict[str, Members]:
         """Weigh the groups that are proposed now against those on show, and name what comes of it."""

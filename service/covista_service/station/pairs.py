@@ -34,6 +34,11 @@ class Answer:
     outlooks: tuple[Outlook, Outlook] | None = None
     ratios: Ratios = SAME_SCALE
 
+    @property
+    def keyframes(self) -> tuple[KeyframeId, KeyframeId]:
+        """Which keyframes it is of."""
+        return self.first.id, self.second.id
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairRecord:
@@ -57,7 +62,7 @@ class PairRecord:
     def explained(self) -> bool:
         """Was the last survey, and with it the planes that it can tell, of the answer's keyframes?"""
         answer = self.answer
-        return answer is not None and self.surveyed == (answer.first.id, answer.second.id)
+        return answer is not None and self.surveyed == answer.keyframes
 
 
 _NOTHING = PairRecord()
@@ -91,20 +96,22 @@ class Pairs:
         outcome = FAILED if compared is None else str(compared.outcome)
         self._records[pair] = replace(self[pair], compared=compared, outcome=outcome, surveyed=(first.id, second.id))
 
-    def enter(self, pair: Pair, answer: Answer) -> None:
-        """Enter the overlap as read from what is known now.
+    def enter(self, pair: Pair, answer: Answer) -> bool:
+        """Enter the overlap as read from what is known now; True if the last one was read from the same keyframes.
 
         Read anew from the same keyframes an answer may be better, but it is no younger.
         """
         record = self[pair]
+        again = record.answer is not None and record.answer.keyframes == answer.keyframes
         if record.expired is not None and _same(record.expired, answer):
-            return
+            return again
         if record.answer is not None and _same(record.answer, answer):
             self._records[pair] = replace(record, answer=replace(answer, computed_ns=record.answer.computed_ns))
-            return
+            return again
         self._records[pair] = replace(record, answer=answer, expired=None)
         self._by_age.pop(pair, None)
         self._by_age[pair] = answer.computed_ns
+        return again
 
     def expire(self, now_ns: int) -> list[Pair]:
         """Drop the answers that have become too old to stand for anything; the pairs that are unknown now."""
@@ -133,4 +140,4 @@ class Pairs:
 
 def _same(held: Answer, answer: Answer) -> bool:
     """Do two answers rest on the same keyframes in the same way?"""
-    return (held.first.id, held.second.id, held.found_by) == (answer.first.id, answer.second.id, answer.found_by)
+    return (held.keyframes, held.found_by) == (answer.keyframes, answer.found_by)

@@ -9,11 +9,11 @@ import numpy as np
 from covista_service.grouping import selection
 from covista_service.grouping.affinity import Affinity
 from covista_service.grouping.bounds import Bounds
-from covista_service.grouping.components import components
+from covista_service.grouping.components import LINK, components
 from covista_service.grouping.hysteresis import held
 from covista_service.grouping.k_means import Labels
-from covista_service.grouping.scores import outsider
-from covista_service.grouping.selection import Contributions, SelectionOptions
+from covista_service.grouping.scores import Contributions, outsider
+from covista_service.grouping.selection import SelectionOptions
 from covista_service.grouping.similarity import Floats
 from covista_service.station.options import GroupingOptions
 
@@ -53,7 +53,7 @@ def propose(affinity: Affinity, S: Floats, options: GroupingOptions, shown: Labe
     if options.grouping == "components":
         chosen_by = replace(chosen_by, criterion="silhouette")
         contributions = selection.contributions(S, chosen_by)
-        labels = components(S, chosen_by.stranger, bounds)
+        labels = components(S, LINK, bounds)
         formed = len(np.unique(labels))
         scores = ((formed, float(contributions(labels).sum())),) if count else ()
         return Proposal(labels, scores, note, contributions, bounds)

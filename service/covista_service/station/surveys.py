@@ -174,8 +174,8 @@ class Surveys:
             plausible = bool(meet) or self._worth_another_look(pair, both)
             self._agenda.judge(pair, plausible=plausible)
             if not plausible:
-                self._pairs.enter(pair, Answer((0.0, 0.0), FoundBy.PREDICTED, now_ns, *both))
-                self._groups.see(pair, self._pairs.overlaps(pair))
+                again = self._pairs.enter(pair, Answer((0.0, 0.0), FoundBy.PREDICTED, now_ns, *both))
+                self._groups.see(pair, self._pairs.overlaps(pair), again=again)
 
     def _look_over(self, pair: Pair, now_ns: int) -> None:
         """A survey that verifies a pair makes it worth reading; one that does not ends what was kept for that alone."""
@@ -206,8 +206,8 @@ class Surveys:
         others = [(other, scales.ratios(robot, other.keyframe.id.robot)) for other in beside if other is not None]
         for answer in self._overlaps_of(outlook, others, now_ns):
             pair = (answer.first.id.robot, answer.second.id.robot)
-            self._pairs.enter(pair, answer)
-            self._groups.see(pair, self._pairs.overlaps(pair))
+            again = self._pairs.enter(pair, answer)
+            self._groups.see(pair, self._pairs.overlaps(pair), again=again)
 
     def _note(self, keyframe: KeyframeId) -> None:
         if keyframe in self._compared:

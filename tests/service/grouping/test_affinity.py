@@ -384,3 +384,19 @@ def test_the_farthest_that_robots_may_be_is_no_trouble() -> None:
     affinity = row(-almost, almost, 0)
     for sigma in SIGMAS:
         assert np.isfinite(affinity.similarity(0.5, sigma)).all()
+
+
+keyframes = st.lists(st.lists(shares, min_size=1, max_size=4), min_size=1, max_size=6)
+
+
+@given(smoothing=st.floats(0.05, 0.95), told=keyframes)
+def test_of_one_pair_of_pictures_the_last_reading_counts(smoothing: float, told: list[list[float]]) -> None:
+    affinity = row(0, 1, smoothing=smoothing)
+    for readings in told:
+        for number, q in enumerate(readings):
+            affinity.see("r0", "r1", q, q, again=number > 0)
+    expected = told[0][-1]
+    for readings in told[1:]:
+        expected += smoothing * (readings[-1] - expected)
+    assert affinity.mutual[0, 1] == pytest.approx(expected, abs=1e-12)
+    assert 0 <= affinity.mutual[0, 1] <= 1

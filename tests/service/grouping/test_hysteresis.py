@@ -5,7 +5,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import pytest
 from covista_service.grouping.continuity import Members
-from covista_service.grouping.hysteresis import Contributions, HysteresisOptions, Pending, Standing, weigh
+from covista_service.grouping.hysteresis import HysteresisOptions, Pending, Standing, held, weigh
+from covista_service.grouping.scores import Contributions
 from covista_service.grouping.similarity import Floats
 from hypothesis import given
 from hypothesis import strategies as st
@@ -144,7 +145,7 @@ def test_a_change_that_changes_begins_to_wait_anew() -> None:
 
 @pytest.mark.parametrize("persistence_s", [0.1, 3.0])
 def test_what_flickers_is_never_shown(persistence_s: float) -> None:
-    standing, options = BEFORE, HysteresisOptions(0.5, persistence_s)
+    standing, options = BEFORE, HysteresisOptions(clear=0.5, persistence_s=persistence_s)
     for at_s in range(60):
         standing = step(standing, (MOVED, "abc def gh", "ab c def gh", "abc def gh")[at_s % 4], SMALL, at_s, options)
         assert standing.clusters == BEFORE.clusters
@@ -199,13 +200,6 @@ def test_a_gain_where_nobody_contributes_anything_has_to_persist() -> None:
     standing = step(Standing(groups("a b")), "ab", inside(slight), robots="ab")
     assert standing.clusters == groups("a b")
     assert step(standing, "ab", inside(slight), 5.0, robots="ab").clusters == groups("ab")
-
-
-@pytest.mark.parametrize(("typical", "expected"), [(0.0, "a b"), (0.5, "ab")])
-def test_what_is_typical_is_the_measure_of_robots_that_have_none(typical: float, expected: str) -> None:
-    apart = inside(np.array([[1.0, 0.28], [0.28, 1.0]]))
-    standing = weigh({"g1": frozenset("ab")}, "ab", np.array([0, 1]), apart, 0, OPTIONS, (), typical)
-    assert standing.clusters == groups(expected)
 
 
 def test_the_order_of_robots_does_not_matter() -> None:
@@ -266,3 +260,18 @@ def test_robots_that_stand_there_twice_are_refused() -> None:
 def test_labels_that_do_not_fit_are_refused(labels: NDArray[np.intp]) -> None:
     with pytest.raises(ValueError, match="3 robots have as many labels"):
         weigh({}, "abc", labels, never, 0, OPTIONS)
+
+
+@given(seed=st.integers(0, 1000), count=st.integers(1, 9), gain=st.floats(0, 0.9))
+def test_groups_on_show_mix_into_the_similarity(seed: int, count: int, gain: float) -> None:
+    rng = np.random.default_rng(seed)
+    S = rng.uniform(0, 1, (count, count))
+    S = (S + S.T) / 2
+    np.fill_diagonal(S, 1.0)
+    labels = rng.integers(0, count, count)
+    mixed = held(S, labels, gain)
+    together = labels[:, None] == labels
+    np.testing.assert_allclose(mixed, np.where(together, S + gain * (1 - S), (1 - gain) * S), atol=1e-15)
+    np.testing.assert_array_equal(mixed, mixed.T)
+    np.testing.assert_array_equal(np.diag(mixed), 1.0)
+    np.testing.assert_array_equal(held(S, labels, 0.0), S)

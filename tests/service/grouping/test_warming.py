@@ -13,6 +13,12 @@ from covista_service.grouping.selection import Criterion, SelectionOptions, choo
 """
 _AFTERWARDS = """
 rng = np.random.default_rng(0)
+# Rooms of all fillings: a matrix that is read whole is another type to the compiler than a part of one.
+small = Affinity()
+for number in range(18):
+    small.add(f"r{number:02}", rng.uniform(0, 9, 3))
+    for sigma in ("shared", "std"):
+        small.similarity(0.5, sigma)
 affinity = Affinity(0.3)
 for number in range(40):
     affinity.add(f"r{number}", rng.uniform(0, 9, 3))

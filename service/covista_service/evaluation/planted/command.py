@@ -16,7 +16,7 @@ def planted(
         Path | None, typer.Option(metavar="FOLDER", help="Where to put planted.json and plots, as PNG.")
     ] = None,
     seeds: Annotated[int, typer.Option(min=1, help="How many swarms.")] = 216,
-    first_seed: Annotated[int, typer.Option(min=0, help="Seed of the first; 0 to 99 chose the parameters.")] = 1000,
+    first_seed: Annotated[int, typer.Option(min=0, help="Seed of the first; 0 to 143 chose the parameters.")] = 1000,
     largest: Annotated[int, typer.Option(min=81, max=1000, help="Robots of the largest swarm.")] = 200,
     rendered: Annotated[int, typer.Option(min=0, help="How many swarms more, before rendered worlds.")] = 4,
     drives: Annotated[int, typer.Option(min=0, help="How many movers drive through noisy swarms of each size.")] = 8,

@@ -10,7 +10,7 @@ from covista_service.evaluation.planted.layout import Labels
 from covista_service.evaluation.planted.swarm import Swarm
 from covista_service.grouping import similarity
 from covista_service.grouping.bounds import Bounds
-from covista_service.grouping.components import components
+from covista_service.grouping.components import LINK, components
 from covista_service.grouping.scores import outsider
 from covista_service.grouping.selection import Criterion, SelectionOptions, choose
 from covista_service.grouping.similarity import Floats, Sigma
@@ -36,8 +36,8 @@ def by_similarity(S: Floats, criterion: Criterion, alpha: float = ALPHA) -> Labe
 
 
 def linked(swarm: Swarm) -> Labels:
-    """Connected components over similarities above an outsider's, as the station forms them."""
-    return components(similarity_of(swarm, "shared", ALPHA), outsider(ALPHA), Bounds())
+    """Connected components over strong similarities, as the station forms them."""
+    return components(similarity_of(swarm, "shared", ALPHA), LINK, Bounds())
 
 
 METHODS: Mapping[str, Method] = {

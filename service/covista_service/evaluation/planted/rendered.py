@@ -12,7 +12,6 @@ from covista_clients.simulation.vantage import open_sights, towards, vantage
 from covista_clients.simulation.viewing import facing, pinhole
 from covista_clients.simulation.world import World
 from covista_schemas.messages import Pose
-from numpy.typing import NDArray
 
 from covista_service.evaluation import methods
 from covista_service.evaluation.case import Answer, Pair
@@ -35,13 +34,12 @@ _ASIDE_RAD = 0.08
 class RenderedSwarm:
     """A swarm whose overlaps come from images, NaN where a pair was not answered.
 
-    `features` (N, N): similarity by numbers of verified matches (Snavely et al. 2008). `sharing` (N, N): whether two
-    cameras have map points in common, from matches that their geometry bears out.
+    Two cameras have map points in common by matches that their geometry bears out. `features` (N, N): similarity by
+    numbers of verified matches (Snavely et al. 2008).
     """
 
     swarm: Swarm
     features: Floats
-    sharing: NDArray[np.bool_]
 
 
 def rendered(seed: int) -> RenderedSwarm:
@@ -58,8 +56,8 @@ def rendered(seed: int) -> RenderedSwarm:
     for a, b in pairs:
         sharing[a, b] = sharing[b, a] = case.surveys[a, b].survey.outcome is Outcome.MEASURED
     positions = np.array([pose.position_m for pose in poses])
-    swarm = Swarm(positions, _matrix(answers, len(poses), np.nan), truth, "rendered", seed)
-    return RenderedSwarm(swarm, _matrix(counted, len(poses), 0.0), sharing)
+    swarm = Swarm(positions, _matrix(answers, len(poses), np.nan), sharing, truth, "rendered", seed)
+    return RenderedSwarm(swarm, _matrix(counted, len(poses), 0.0))
 
 
 def _stand(world: World, rng: np.random.Generator, count: int) -> tuple[list[Pose], Labels]:

@@ -5,9 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 
-from covista_service.evaluation.planted.comparators import coslam_groups
 from covista_service.evaluation.planted.judging import adjusted_rand
 from covista_service.evaluation.planted.layout import Labels
 from covista_service.evaluation.planted.methods import FEATURES_CRITERION, METHODS, Method, by_similarity
@@ -20,11 +18,12 @@ from covista_service.grouping.selection import Criterion, SelectionOptions
 Tell = Callable[[str], None]
 
 # `measured`: noise, and pairs that nobody has compared. `predicted`: those have what poses and depths predict.
-# `biased`: each robot puts a factor of its own on all its overlaps.
+# `biased`: each robot puts a factor of its own on all its overlaps. `harsh`: more of everything.
 VARIANTS: Mapping[str, Disturbance] = {
     "measured": Disturbance(),
     "predicted": Disturbance(predicted=True),
     "biased": Disturbance(bias=0.2),
+    "harsh": Disturbance(noise=0.1, unknown=0.5, bias=0.3),
 }
 RENDERED = "rendered"
 # Criteria that are compared with a noisy mover, in swarms of so many; Eq. 17 takes its time.
@@ -73,10 +72,9 @@ def moving(options: RunOptions, tell: Tell = lambda _: None) -> list[Row]:
 
 
 def methods_of(seen: RenderedSwarm) -> dict[str, Method]:
-    """Every method for a rendered swarm: CoSLAM's by map points that are shared, and one by numbers of features."""
+    """Every method for a rendered swarm, and one by numbers of features."""
     return {
         **METHODS,
-        "coslam": partial(coslam_groups, seen.sharing),
         "features": lambda _: by_similarity(seen.features, FEATURES_CRITERION),
     }
 

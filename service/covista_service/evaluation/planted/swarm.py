@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from covista_service.evaluation.planted.layout import KINDS, Labels, Layout, all_apart, all_in_one, planted
 from covista_service.evaluation.planted.views import frustum_overlap, overlap
@@ -26,11 +27,13 @@ class Swarm:
     """Robots to be grouped, and how they belong together in truth.
 
     `positions_m` (N, 3). `overlap` (N, N), row i: share of i's image seen by j, NaN where nobody has compared the
-    two, 1 on the diagonal. `truth` (N,) labels. `kind` is the scene, or `one`, `apart` or `rendered`.
+    two, 1 on the diagonal. `sharing` (N, N): do two have map points in common? False where nobody has compared them.
+    `truth` (N,) labels. `kind` is the scene, or `one`, `apart` or `rendered`.
     """
 
     positions_m: Floats
     overlap: Floats
+    sharing: NDArray[np.bool_]
     truth: Labels
     kind: Story
     seed: int
@@ -97,7 +100,10 @@ def disturbed(known: Planting, disturbance: Disturbance) -> Swarm:
     )
     overlap = np.where(hidden, filling, measured)
     np.fill_diagonal(overlap, 1.0)
-    return Swarm(known.positions_m, overlap, known.truth, known.kind, known.seed)
+    # Points that both see are in both maps, however far off a measured share of the image may be.
+    common = (known.overlap > 0) & (known.overlap.T > 0)
+    sharing = common & ~(hidden | hidden.T) | np.eye(count, dtype=np.bool_)
+    return Swarm(known.positions_m, overlap, sharing, known.truth, known.kind, known.seed)
 
 
 def _known(layout: Layout, kind: Story, seed: int) -> Planting:

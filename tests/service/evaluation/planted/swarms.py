@@ -13,4 +13,4 @@ def clear(sizes: tuple[int, ...], apart_m: float = 20.0, seed: int = 0) -> Swarm
     positions = np.column_stack([apart_m * truth, np.zeros((len(truth), 2))]) + rng.normal(0, 0.3, (len(truth), 3))
     overlap = np.where(truth[:, None] == truth, 0.8, 0.0)
     np.fill_diagonal(overlap, 1.0)
-    return Swarm(positions, overlap, truth, "ground", seed)
+    return Swarm(positions, overlap, overlap > 0, truth, "ground", seed)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from covista_service.evaluation.planted.comparators import coslam_groups, mutual
+from covista_service.evaluation.planted.comparators import coslams, mutual
 from covista_service.evaluation.planted.judging import adjusted_rand
 from covista_service.evaluation.planted.methods import METHODS, similarity_of
 from covista_service.evaluation.planted.swarm import Disturbance, disturbed, plant
@@ -35,6 +35,7 @@ def test_the_order_of_robots_does_not_matter(name: str) -> None:
         swarm,
         positions_m=swarm.positions_m[order],
         overlap=swarm.overlap[np.ix_(order, order)],
+        sharing=swarm.sharing[np.ix_(order, order)],
         truth=swarm.truth[order],
     )
     assert adjusted_rand(METHODS[name](swarm)[order], METHODS[name](turned)) == 1.0
@@ -61,7 +62,7 @@ def test_one_link_is_enough_for_components_and_too_little_for_groups() -> None:
     swarm = clear((5, 5))
     a, b = int(np.flatnonzero(swarm.truth == 0)[0]), int(np.flatnonzero(swarm.truth == 1)[0])
     overlap = swarm.overlap.copy()
-    overlap[a, b] = overlap[b, a] = 0.5
+    overlap[a, b] = overlap[b, a] = 0.7
     linked = replace(swarm, overlap=overlap)
     assert len(set(METHODS["overlap"](linked).tolist())) == 1
     assert adjusted_rand(swarm.truth, METHODS["fiedler"](linked)) == 1.0
@@ -73,15 +74,19 @@ def test_the_station_s_components_hang_together_over_strong_links() -> None:
     a, b = int(np.flatnonzero(swarm.truth == 0)[0]), int(np.flatnonzero(swarm.truth == 1)[0])
     overlap = swarm.overlap.copy()
     overlap[a, b] = overlap[b, a] = 0.7
-    assert len(set(METHODS["components"](replace(swarm, overlap=overlap)).tolist())) == 1
+    positions_m = swarm.positions_m.copy()
+    positions_m[b] = positions_m[a]
+    near = replace(swarm, overlap=overlap, positions_m=positions_m)
+    # The one has gone over to the other group, and takes nobody along: its own are too far away now.
+    assert adjusted_rand(np.where(np.arange(10) == b, 0, swarm.truth), METHODS["components"](near)) == 1.0
 
 
 def test_coslam_parts_who_shares_nothing_and_who_is_too_far_away() -> None:
     swarm = clear((4, 4))
-    assert adjusted_rand(swarm.truth, coslam_groups(swarm.overlap > 0, swarm)) == 1.0
-    everyone = np.ones((8, 8), np.bool_)
-    assert len(set(coslam_groups(everyone, swarm).tolist())) == 1
+    assert adjusted_rand(swarm.truth, coslams(swarm)) == 1.0
+    everyone = replace(swarm, sharing=np.ones((8, 8), np.bool_))
+    assert len(set(coslams(everyone).tolist())) == 1
     # One of many stands more than six times as far away as two usually do.
     many = clear((30,))
     far = replace(many, positions_m=np.vstack([many.positions_m[:-1], [(500.0, 0, 0)]]))
-    assert sorted(np.bincount(coslam_groups(np.ones((30, 30), np.bool_), far)).tolist()) == [1, 29]
+    assert sorted(np.bincount(coslams(far)).tolist()) == [1, 29]

@@ -22,7 +22,7 @@ def test_pictures_tell_who_looks_at_the_same(seen: RenderedSwarm) -> None:
     assert shared[mates].mean() > shared[swarm.truth[:, None] != swarm.truth].mean() + 0.3
     assert seen.features[mates].mean() > seen.features[swarm.truth[:, None] != swarm.truth].mean()
     assert np.array_equal(seen.features, seen.features.T)
-    assert np.array_equal(seen.sharing, seen.sharing.T)
+    assert np.array_equal(seen.swarm.sharing, seen.swarm.sharing.T)
 
 
 def test_numbers_of_features_group_too(seen: RenderedSwarm) -> None:
