@@ -264,7 +264,7 @@ class LiveSettings(Report):
         description="What groups are made from: spectral (the similarity), components (robots linked by similarities "
         "above a threshold), distance (closeness alone).",
     )
-    hysteresis: Hysteresis = Hysteresis()
+    hysteresis: Hysteresis = Field(default=Hysteresis(), description="How steady groups on show are.")
 
 
 class GroupsReport(Report):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Annotated, Literal, NamedTuple, Self
 
 from covista_schemas.errors import CovistaError, LinkError
 from covista_schemas.keys import ID_PATTERN
-from covista_schemas.reports import LiveSettings
+from covista_schemas.reports import Hysteresis, LiveSettings
 from covista_schemas.zenoh_config import check_endpoint
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, InitSettingsSource, NoDecode, PydanticBaseSettingsSource, SettingsConfigDict
@@ -19,6 +20,8 @@ from sqlalchemy.exc import ArgumentError
 PREFIX = "COVISTA_"
 # Settings that are flags of `serve` too.
 FLAGS = ("api", "link", "connect", "database", "workers", "insecure")
+# What pydantic-settings says of a variable that has several values and is not JSON.
+_UNREAD = r'error parsing value for field "(\w+)" from source'
 
 
 class SettingsError(CovistaError):
@@ -72,7 +75,12 @@ class Settings(LiveSettings, BaseSettings):
     """Everything that can be set, flat: the names are the keys of the TOML file and, with COVISTA_, the variables."""
 
     model_config = SettingsConfigDict(
-        env_prefix=PREFIX, extra="forbid", frozen=True, env_ignore_empty=True, hide_input_in_errors=True
+        env_prefix=PREFIX,
+        env_nested_delimiter="__",
+        extra="forbid",
+        frozen=True,
+        env_ignore_empty=True,
+        hide_input_in_errors=True,
     )
 
     api: Annotated[str, AfterValidator(_check_address)] = Field(
@@ -161,11 +169,23 @@ def _one_line(error: ValidationError) -> str:
     """The first wrong setting, what is wrong with it, and what is allowed."""
     found = error.errors(include_url=False)
     if not found[0]["loc"]:
-        return found[0]["msg"].removeprefix("Value error, ")
+        said = found[0]["msg"].removeprefix("Value error, ")
+        unread = re.match(_UNREAD, said)
+        if unread is None:
+            return said
+        variable = PREFIX + unread[1].upper()
+        return f"setting {unread[1]} ({variable}): not JSON; or set a part of it, as {variable}__NAME"
     name = str(found[0]["loc"][0])
     known = Settings.model_fields
     if name not in known:
         return f"setting {name} is not known; known are {', '.join(known)}"
     reasons = dict.fromkeys(each["msg"].removeprefix("Value error, ") for each in found if each["loc"][0] == name)
     flag = f"--{name}, " if name in FLAGS else ""
-    return f"setting {name} ({flag}{PREFIX}{name.upper()}): {'; or '.join(reasons)}. {known[name].description}"
+    variable, description = PREFIX + name.upper(), known[name].description
+    inner = found[0]["loc"][1:]
+    if known[name].annotation is Hysteresis and inner:
+        part = str(inner[0])
+        name, variable = f"{name}.{part}", f"{variable}__{part.upper()}"
+        held = Hysteresis.model_fields.get(part)
+        description = held.description if held else f"Known are {', '.join(Hysteresis.model_fields)}."
+    return f"setting {name} ({flag}{variable}): {'; or '.join(reasons)}. {description}"

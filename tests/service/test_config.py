@@ -2,13 +2,13 @@ import pickle
 from pathlib import Path
 
 import pytest
-from covista_schemas.reports import GroupBounds, LiveSettings
+from covista_schemas.reports import GroupBounds, Hysteresis, LiveSettings
 from covista_service.config import Address, Settings, SettingsError, load, parse_address
 
 
 @pytest.fixture(autouse=True)
 def _clean_environment(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in Settings.model_fields:
+    for name in (*Settings.model_fields, *(f"hysteresis__{name}" for name in Hysteresis.model_fields)):
         monkeypatch.delenv(f"COVISTA_{name.upper()}", raising=False)
 
 
@@ -52,7 +52,6 @@ def test_the_environment_says_lists_and_choices_as_text(monkeypatch: pytest.Monk
         ("criterion", "best", "'adaptive', 'silhouette'"),
         ("grouping", "best", "'spectral', 'components' or 'distance'"),
         ("min_group_size", 0, "greater than or equal to 1"),
-        ("hysteresis", {"gain": -1}, "greater than or equal to 0"),
         ("workers", "dask", "'threads' or 'processes'"),
         ("workers_count", 0, "greater than or equal to 1"),
         ("api", "8000", "not HOST:PORT"),
@@ -118,3 +117,37 @@ def test_addresses_of_both_families() -> None:
     assert parse_address("[::1]:80") == Address("::1", 80)
     with pytest.raises(ValueError, match="not HOST:PORT"):
         parse_address("localhost:http")
+
+
+def test_parts_of_a_setting_can_be_set_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "station.toml"
+    file.write_text("[hysteresis]\npersistence_s = 2.0\n")
+    assert load(file=file).hysteresis == Hysteresis(persistence_s=2.0)
+    monkeypatch.setenv("COVISTA_HYSTERESIS__GAIN", "0.1")
+    assert load().hysteresis == Hysteresis(gain=0.1)
+    monkeypatch.setenv("COVISTA_GROUPS__MIN", "2")
+    monkeypatch.setenv("COVISTA_GROUPS__MAX", "3")
+    assert load().groups == GroupBounds(min=2, max=3)
+
+
+@pytest.mark.parametrize(
+    ("variable", "value", "said"),
+    [
+        ("HYSTERESIS__GAIN", "-1", "setting hysteresis.gain (COVISTA_HYSTERESIS__GAIN): Input should be greater than"),
+        ("HYSTERESIS", '{"gain": "x"}', "setting hysteresis.gain (COVISTA_HYSTERESIS__GAIN): Input should be a valid"),
+        ("HYSTERESIS", '{"colour": 1}', "Known are gain, persistence_s, smoothing."),
+        (
+            "HYSTERESIS",
+            "gain=0.1",
+            "setting hysteresis (COVISTA_HYSTERESIS): not JSON; or set a part of it, as COVISTA_HYSTERESIS__NAME",
+        ),
+    ],
+)
+def test_what_is_wrong_with_a_part_names_the_part(
+    monkeypatch: pytest.MonkeyPatch, variable: str, value: str, said: str
+) -> None:
+    monkeypatch.setenv(f"COVISTA_{variable}", value)
+    with pytest.raises(SettingsError) as caught:
+        load()
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)

@@ -39,6 +39,8 @@ _PAIR_OVERLAPS = (0.1, 0.6)
 _LEAVES, _ARRIVES = 0.2, 0.8
 _LEAST_GROUP = 3
 _NOWHERE = -1
+# Where the mover goes.
+_GOAL = 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,8 +67,8 @@ class Row:
     """What a setting does, as means over drives.
 
     Changes are labels of robots that are not what they were a step before; `others` are those of all but the mover,
-    and `true` all that the true overlaps make. `lag` is how many steps after the truth the mover is shown with a new
-    group; `astray` the share of steps in which it is not with the group with which it truly is.
+    and `true` all that the true overlaps make. `lag` is how many steps after the truth the mover is shown with the
+    group that it drives to; `astray` the share of steps in which it is not with the group with which it truly is.
     """
 
     criterion: Criterion
@@ -233,9 +235,9 @@ def _homes(labels: Labels, planted: Labels) -> Labels:
 
 
 def _lags(truly: Labels, home: Labels) -> float:
-    """Mean number of steps until the mover is shown with a group that it has truly joined, or has left again."""
+    """Mean number of steps until the mover is shown with the group that it drives to, or has truly left it again."""
     lags = []
-    joins = np.flatnonzero((truly[1:] != truly[:-1]) & (truly[1:] != _NOWHERE)) + 1
+    joins = np.flatnonzero((truly[1:] != truly[:-1]) & (truly[1:] == _GOAL)) + 1
     for t in joins.tolist():
         stay = np.flatnonzero(truly[t:] != truly[t])
         until = len(truly) if not len(stay) else t + int(stay[0])
