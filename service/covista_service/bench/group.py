@@ -37,7 +37,8 @@ def rows(long: bool) -> Iterator[Row]:
     `group/gain_n*`: the same by the criterion gain, from the labels of before one robot went over to another group.
     `group/row_n1000`, `group/see_n1000`: its new position, and its overlaps with thirty neighbours, entered.
     `group/read_n1000`, `group/read_unknown_n1000`: the similarity matrix of that, with all overlaps known and with a
-    tenth unknown. `group/weigh_n1000`: hysteresis where nothing changes. All on one core.
+    tenth unknown. `group/weigh_n1000`: hysteresis where nothing changes. `group/evaluate_n1000`: all that a station
+    does, from news of a robot to groups with labels. All on one core.
     """
     rounds = _LONG_ROUNDS if long else _ROUNDS
     with one_thread():
@@ -64,6 +65,7 @@ def _events(count: int, mark_ms: float, rounds: int) -> Iterator[Row]:
         "read": group_calls.reading(affinity_of(count)),
         "read_unknown": group_calls.reading(_known_in_part(count)),
         "weigh": group_calls.weighing(count),
+        "evaluate": group_calls.evaluating(count),
     }
     for calls in (news, told):
         times = alternately_ms(list(calls.values()), rounds)

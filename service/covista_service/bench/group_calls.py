@@ -12,6 +12,8 @@ from covista_service.bench.group_swarm import ALPHA, Swarm, affinity, plant
 from covista_service.grouping.affinity import Affinity
 from covista_service.grouping.hysteresis import HysteresisOptions, weigh
 from covista_service.grouping.selection import Criterion, SelectionOptions, choose, contributions
+from covista_service.station.groups import Groups
+from covista_service.station.options import StationOptions
 
 Call = Callable[[], object]
 # Whose news it is, one robot after the other; and how many neighbours tell of an overlap with it.
@@ -90,3 +92,23 @@ def weighing(count: int) -> Call:
     shown = {f"g{label}": frozenset(named[labels == label].tolist()) for label in range(int(labels.max()) + 1)}
     weighed = HysteresisOptions()
     return lambda: weigh(shown, robots, labels, contributions(S, options), 0, weighed)
+
+
+def evaluating(count: int) -> Call:
+    """A whole evaluation of the station: similarity, groups, hysteresis, labels; one robot has moved since the last."""
+    swarm = swarm_of(count)
+    robots, overlap = swarm.robots, swarm.overlap.tolist()
+    held = Groups(StationOptions())
+    for robot, place in zip(robots, swarm.position_m, strict=True):
+        held.place(robot, place)
+    for j in range(count):
+        for i in range(j):
+            held.see((robots[i], robots[j]), (overlap[i][j], overlap[j][i]))
+    held.evaluate((), 0, at_once=True)
+    places = cycle(zip(robots, swarm.position_m, strict=True))
+
+    def evaluate() -> None:
+        held.place(*next(places))
+        held.evaluate((), 0, at_once=True)
+
+    return evaluate

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from io import BytesIO
 
 import numpy as np
 
-from covista_service.drawing.plots import COLOURS, need_matplotlib
+from covista_service.drawing.plots import COLOURS, blank, png, styled
 
 # Those who share a colour, from the ninth method on, differ in dash and mark.
 _DASHES = ("-", "--", ":")
@@ -19,39 +18,31 @@ _LETTER_IN = 0.09
 
 def class_plot(classes: Sequence[str], series: Mapping[str, Sequence[float | None]], title: str, y_label: str) -> bytes:
     """A line per method over classes, y from 0 to 1, named where it ends; None leaves a gap."""
-    need_matplotlib()
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     names_in = 0.4 + _LETTER_IN * max(map(len, series), default=0)
-    figure = Figure(figsize=(2.0 + 1.2 * len(classes) + names_in, _HEIGHT_IN), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots()
-    places = np.arange(len(classes))
-    ends: dict[str, float] = {}
-    for k, (name, values) in enumerate(series.items()):
-        heights = np.array([np.nan if value is None else value for value in values])
-        lap = k // len(COLOURS)
-        look, dash = _MARKS[lap % len(_MARKS)], _DASHES[lap % len(_DASHES)]
-        axes.plot(places, heights, look + dash, color=COLOURS[k % len(COLOURS)], markersize=5, linewidth=1.7)
-        ends[name] = next((value for value in reversed(values) if value is not None), 0.0)
-    axes.set(ylim=(-0.02, 1.02), xlim=(-0.3, len(classes) - 0.7), ylabel=y_label, title=title)
-    axes.set_xticks(places, classes)
-    axes.grid(color="#e4e4e4")
-    axes.spines[["top", "right"]].set_visible(False)
-    for k, (name, place) in enumerate(_spread(ends).items()):
-        axes.annotate(
-            name,
-            (len(classes) - 1, ends[name]),
-            (len(classes) - 0.55, place),
-            color=COLOURS[k % len(COLOURS)],
-            va="center",
-            annotation_clip=False,
-            arrowprops={"arrowstyle": "-", "color": "#c8c8c8", "lw": 0.8, "shrinkB": 4},
-        )
-    png = BytesIO()
-    figure.savefig(png, format="png", dpi=110, metadata={"Software": None})
-    return png.getvalue()
+    with styled():
+        figure = blank(2.0 + 1.2 * len(classes) + names_in, _HEIGHT_IN)
+        axes = figure.subplots()
+        places = np.arange(len(classes))
+        ends: dict[str, float] = {}
+        for k, (name, values) in enumerate(series.items()):
+            heights = np.array([np.nan if value is None else value for value in values])
+            lap = k // len(COLOURS)
+            look, dash = _MARKS[lap % len(_MARKS)], _DASHES[lap % len(_DASHES)]
+            axes.plot(places, heights, look + dash, color=COLOURS[k % len(COLOURS)], markersize=5, linewidth=1.7)
+            ends[name] = next((value for value in reversed(values) if value is not None), 0.0)
+        axes.set(ylim=(-0.02, 1.02), xlim=(-0.3, len(classes) - 0.7), ylabel=y_label, title=title)
+        axes.set_xticks(places, classes)
+        for k, (name, place) in enumerate(_spread(ends).items()):
+            axes.annotate(
+                name,
+                (len(classes) - 1, ends[name]),
+                (len(classes) - 0.55, place),
+                color=COLOURS[k % len(COLOURS)],
+                va="center",
+                annotation_clip=False,
+                arrowprops={"arrowstyle": "-", "color": "#c8c8c8", "lw": 0.8, "shrinkB": 4},
+            )
+        return png(figure)
 
 
 def _spread(ends: Mapping[str, float]) -> dict[str, float]:

@@ -68,7 +68,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_regroupings_and_news_have_rows_and_those_with_marks_are_judged() -> None:
     rows = {row.case: row for row in group.rows(long=False)}
     marked = {"n12": "<= 1e+06 ms and peer / 1e-09", "gain_n12": "<= 1e+06 ms", "row_n12": "<= 1e+06 ms"}
-    reported = ("see_n12", "read_n12", "read_unknown_n12", "weigh_n12")
+    reported = ("see_n12", "read_n12", "read_unknown_n12", "weigh_n12", "evaluate_n12")
     assert {case: row.mark for case, row in rows.items()} == marked | dict.fromkeys(reported, "reported")
     assert {(row.bench, row.unit, row.holds) for row in rows.values()} == {("group", "ms", True)}
     assert {case for case, row in rows.items() if row.peer_median} == {"n12"}
