@@ -79,6 +79,14 @@ def test_hysteresis_changes_less_than_what_is_proposed_and_freezes_nobody() -> N
     assert held.astray < 0.2
 
 
+def test_by_default_others_than_the_mover_hardly_change() -> None:
+    raw, held = mover.rows(SelectionOptions(), (10,), 4, (AS_PROPOSED, HYSTERESIS), seed=1)
+    assert held.others_per_100 < raw.others_per_100 / 8
+    # No more than the true overlaps make.
+    assert held.changes_per_100 <= raw.true_per_100
+    assert held.astray < 0.25
+
+
 def test_a_change_that_never_comes_lags_until_the_mover_leaves_again() -> None:
     frozen = Setting("frozen", HysteresisOptions(persistence_s=np.inf, clear=np.inf), smoothed=False)
     (row,) = mover.rows(GAIN, (10,), 2, (frozen,))
