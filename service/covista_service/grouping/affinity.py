@@ -34,7 +34,7 @@ class Affinity:
     """
 
     def __init__(self, smoothing: float = 1.0) -> None:
-        self._smoothing = smoothing
+        self._smoothing = _checked_weight(smoothing)
         self._slot: dict[str, int] = {}
         self._position_m = np.zeros((_FIRST_ROOM, 3))
         # Beyond the last slot all is 0, so that blocks can be summed up whole.
@@ -52,7 +52,7 @@ class Affinity:
 
     @smoothing.setter
     def smoothing(self, weight: float) -> None:
-        self._smoothing = weight
+        self._smoothing = _checked_weight(weight)
         if weight == 1:
             self._mutual = (self._overlap + self._overlap.T) / 2
 
@@ -156,7 +156,7 @@ class Affinity:
             return eqs.spread_m(count * (count - 1) // 2, total, squares)
         if sigma == "shared":
             return eqs.shared_sigma_m(self._squared_m2[:count, :count], self._mutual[:count, :count])
-        return sigma
+        return eqs.check_sigma_m(sigma)
 
     def closeness(self, sigma: Sigma = "shared") -> Floats:
         """d_ij of Eq. 15, (N, N)."""
@@ -209,6 +209,12 @@ def _checked(robot: str, position_m: Sequence[float] | Floats) -> Floats:
     if place.shape != (3,) or not (np.abs(place) < FARTHEST_M).all():
         raise ValueError(f"a position is three finite numbers below {FARTHEST_M:g} m, that of {robot} is {position_m}")
     return place
+
+
+def _checked_weight(smoothing: float) -> float:
+    if not 0 < smoothing <= 1:
+        raise ValueError(f"the weight of the newest overlap is more than 0 and at most 1, not {smoothing}")
+    return smoothing
 
 
 def _blocks(count: int) -> int:

@@ -22,6 +22,15 @@ class Bounds:
     groups: Groups = "auto"
     min_group_size: int = 1
 
+    def __post_init__(self) -> None:
+        """Raise ValueError for what is of no such kind."""
+        groups = self.groups
+        pair = isinstance(groups, tuple) and len(groups) == 2 and all(isinstance(each, int) for each in groups)
+        if groups != "auto" and not isinstance(groups, int) and not pair:
+            raise ValueError(f"groups are auto, a number, or (least, largest), not {groups!r}")
+        if not isinstance(self.min_group_size, int):
+            raise ValueError(f"the least size of a group is a number of robots, not {self.min_group_size!r}")
+
     @property
     def least(self) -> int:
         """The smallest number of groups asked for."""

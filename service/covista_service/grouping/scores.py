@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from covista_service.compiled import compiled
 from covista_service.grouping.k_means import Labels
-from covista_service.grouping.similarity import Floats
+from covista_service.grouping.similarity import Floats, check_alpha
 
 Members = tuple[int, ...]
 # What each robot adds (N,) to the score of a grouping with labels (N,) from 0 to M - 1.
@@ -24,7 +24,11 @@ _ROUNDING = 1e-12
 
 
 def outsider(alpha: float) -> float:
-    """The similarity at which a robot is indifferent between company and none, .1 alpha + .5 (1 - alpha)."""
+    """The similarity at which a robot is indifferent between company and none, .1 alpha + .5 (1 - alpha).
+
+    Raises ValueError for an alpha that is none.
+    """
+    check_alpha(alpha)
     return 0.1 * alpha + 0.5 * (1 - alpha)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +61,15 @@ class SelectionOptions:
     min_group_size: int = 1
     stranger: float = outsider(0.5)
 
+    def __post_init__(self) -> None:
+        """Raise ValueError for what is no such option."""
+        if self.criterion not in get_args(Criterion):
+            raise ValueError(f"criteria are {', '.join(get_args(Criterion))}, not {self.criterion!r}")
+        # NaN is in no order with anything.
+        if not 0 <= self.stranger <= 1:
+            raise ValueError(f"an outsider's similarity lies from 0 to 1, not {self.stranger}")
+        Bounds(self.groups, self.min_group_size)
+
     @property
     def bounds(self) -> Bounds:
         """Bounds on number and size."""
@@ -90,7 +99,12 @@ def choose(S: Floats, options: SelectionOptions, start: Labels | None = None) ->
     labels from 0 to N - 1 that gain begins with. Raises ValueError for a matrix that is not symmetric, from 0 to 1 and
     1 on its diagonal, and for bounds that no grouping satisfies.
     """
+    S = np.ascontiguousarray(S, np.float64)
     _check(S)
+    if start is not None and (start.shape != (len(S),) or start.dtype.kind not in "iu"):
+        raise ValueError(
+            f"{len(S)} robots start with as many whole numbers for labels, not {start.dtype} {start.shape}"
+        )
     if not len(S):
         return Choice(np.zeros(0, np.intp), ())
     numbers = candidates(len(S), options)
@@ -227,7 +241,7 @@ def _by_eigengap(S: Floats, options: SelectionOptions, numbers: range) -> Choice
 def _by_gain(S: Floats, options: SelectionOptions, numbers: range, start: Labels | None) -> Choice:
     """Where local moves end; parted further by Ng-Jordan-Weiss, or merged, as far as the bounds demand."""
     expected = scores.expectations(S, options.stranger, GAIN)
-    labels = moves.settle(S, expected, np.arange(len(S)) if start is None else canonical(start, len(S)))
+    labels = moves.settle(S, expected, np.arange(len(S)) if start is None else _dense(start))
     if labels.max() + 1 < numbers.start:
         labels = partition(Spectrum.of(S, numbers.start), numbers.start)
     labels = canonical(_sized(S, labels, options, numbers), len(S))
@@ -285,3 +299,8 @@ def _sized(S: Floats, labels: Labels, options: SelectionOptions, numbers: range)
     if options.min_group_size == 1:
         return labels
     return with_least_size(S, labels, options.min_group_size, numbers.start)
+
+
+def _dense(labels: Labels) -> Labels:
+    """Any labels (N,) as numbers from 0 without a gap."""
+    return np.unique(labels, return_inverse=True)[1].astype(np.intp)

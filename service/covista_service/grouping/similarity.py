@@ -38,7 +38,21 @@ def sigma_m(distance_m: Floats, mutual: Floats, sigma: Sigma) -> float:
     """
     if sigma == "shared":
         return shared_sigma_m(np.square(distance_m), mutual)
-    return standard_sigma_m(distance_m) if sigma == "std" else sigma
+    return standard_sigma_m(distance_m) if sigma == "std" else check_sigma_m(sigma)
+
+
+def check_sigma_m(sigma: float | str) -> float:
+    """A range in metres as it is; ValueError for what is none."""
+    # NaN is not more than anything.
+    if isinstance(sigma, str) or not sigma > 0:
+        raise ValueError(f"sigma is shared, std, or metres above 0, not {sigma!r}")
+    return sigma
+
+
+def check_alpha(alpha: float) -> None:
+    """Raise ValueError for what is no weight of the overlap."""
+    if not 0 <= alpha <= 1:
+        raise ValueError(f"alpha lies from 0 to 1, not {alpha}")
 
 
 def standard_sigma_m(distance_m: Floats) -> float:
@@ -91,15 +105,27 @@ def similarity(mutual: Floats, squared_m2: Floats, alpha: float, sigma_m: float)
     From mutual overlaps (N, N) and squared distances (N, N), m^2. An unknown overlap (NaN) is not zero overlap: it is
     what the best chain over a third robot passes on, the product of the two mutual overlaps that are known, of which
     one at least is more than a quarter: who sees nothing of what a companion of mine sees will see little of mine.
-    Where there is no such link, distance alone speaks.
+    Where there is no such link, distance alone speaks. Raises ValueError for an alpha that is none.
     """
+    check_alpha(alpha)
     S = np.empty_like(squared_m2)
     _mix(squared_m2, mutual, alpha, _within(sigma_m) ** 2, S)
     return S
 
 
 def matrix(distance_m: Floats, overlap: Floats, alpha: float, sigma: Sigma) -> Floats:
-    """Eqs. 15 and 16 from distances and overlaps (N, N; row i: share of i's image seen by j; NaN unknown)."""
+    """Eqs. 15 and 16 from distances and overlaps (N, N; row i: share of i's image seen by j; NaN unknown).
+
+    Raises ValueError for what is no such matrix, alpha or sigma.
+    """
+    distance_m, overlap = np.asarray(distance_m, np.float64), np.asarray(overlap, np.float64)
+    count = len(distance_m)
+    if distance_m.shape != (count, count) or overlap.shape != distance_m.shape:
+        raise ValueError(f"distances and overlaps are square and of one size, not {distance_m.shape}, {overlap.shape}")
+    if not (np.isfinite(distance_m) & (distance_m >= 0)).all():
+        raise ValueError("distances are finite and not below 0")
+    if not (np.isnan(overlap) | ((overlap >= 0) & (overlap <= 1))).all():
+        raise ValueError("an overlap lies from 0 to 1, or is NaN where unknown")
     mutual = mutual_overlap(overlap)
     return similarity(mutual, np.square(distance_m), alpha, sigma_m(distance_m, mutual, sigma))
 

@@ -4,7 +4,9 @@ from typing import get_args
 
 import numpy as np
 import pytest
+from covista_service.grouping.affinity import Affinity
 from covista_service.grouping.selection import Criterion, SelectionOptions, choose
+from covista_service.grouping.similarity import matrix
 
 from tests.service.grouping.swarms import Floats, alike, scattered
 
@@ -54,3 +56,80 @@ def test_what_is_no_similarity_matrix_is_refused_and_says_why(criterion: Criteri
 def test_bounds_that_cannot_be_are_refused(criterion: Criterion, groups, size: int, sentence: str) -> None:
     with pytest.raises(ValueError, match=sentence):
         choose(alike(4, 0.5), SelectionOptions(groups, criterion, size))
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"groups": 2.0}, r"auto, a number, or \(least, largest\), not 2.0"),
+        ({"groups": None}, "not None"),
+        ({"groups": "many"}, "not 'many'"),
+        ({"groups": (1, 2, 3)}, r"not \(1, 2, 3\)"),
+        ({"min_group_size": 1.5}, "a number of robots, not 1.5"),
+        ({"criterion": "best"}, "criteria are adaptive, silhouette, .* not 'best'"),
+        ({"stranger": 5.0}, "lies from 0 to 1, not 5.0"),
+        ({"stranger": np.nan}, "lies from 0 to 1, not nan"),
+    ],
+)
+def test_what_is_no_option_is_refused(options, sentence: str) -> None:
+    with pytest.raises(ValueError, match=sentence):
+        SelectionOptions(**options)
+
+
+@pytest.mark.parametrize("start", [np.zeros(2, int), np.zeros(4), np.zeros((4, 4), int)])
+def test_labels_to_start_with_are_as_many_numbers_as_robots(start) -> None:
+    with pytest.raises(ValueError, match="4 robots start with as many whole numbers"):
+        choose(scattered(1, 4), SelectionOptions(criterion="gain"), start)
+
+
+def test_any_numbers_will_do_for_labels_to_start_with() -> None:
+    S = scattered(1, 6)
+    odd, even = np.array([7, 7, -3, -3, 99, 99]), np.array([0, 0, 1, 1, 2, 2])
+    one, other = (choose(S, SelectionOptions(criterion="gain"), start).labels for start in (odd, even))
+    np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("kind", [np.float32, "F"])
+def test_how_a_matrix_lies_in_memory_does_not_matter(kind) -> None:
+    S = alike(5, 0.5)
+    other = np.asfortranarray(S) if kind == "F" else S.astype(kind)
+    np.testing.assert_array_equal(choose(other, SelectionOptions()).labels, choose(S, SelectionOptions()).labels)
+
+
+TWO = np.array([(0.0, 1.0), (1.0, 0.0)])
+
+
+@pytest.mark.parametrize(
+    ("distance_m", "overlap", "alpha", "sigma", "sentence"),
+    [
+        (TWO, TWO, 1.5, "shared", "alpha lies from 0 to 1, not 1.5"),
+        (TWO, TWO, np.nan, "std", "alpha lies from 0 to 1, not nan"),
+        (TWO, TWO, 0.5, 0.0, "sigma is shared, std, or metres above 0, not 0.0"),
+        (TWO, TWO, 0.5, -1.0, "not -1.0"),
+        (TWO, TWO, 0.5, np.nan, "not nan"),
+        (TWO, TWO, 0.5, "wide", "not 'wide'"),
+        (TWO * np.nan, TWO, 0.5, 1.0, "distances are finite and not below 0"),
+        (-TWO, TWO, 0.5, 1.0, "distances are finite and not below 0"),
+        (TWO, 2 * TWO, 0.5, 1.0, "an overlap lies from 0 to 1, or is NaN"),
+        (TWO, TWO[:1], 0.5, 1.0, "square and of one size"),
+        (np.zeros((2, 3)), np.zeros((2, 3)), 0.5, 1.0, "square and of one size"),
+    ],
+)
+def test_what_no_similarity_can_be_made_from_is_refused(distance_m, overlap, alpha, sigma, sentence: str) -> None:
+    with pytest.raises(ValueError, match=sentence):
+        matrix(distance_m, overlap, alpha, sigma)
+
+
+@pytest.mark.parametrize("smoothing", [0.0, -1.0, 1.5, np.nan])
+def test_a_weight_that_is_none_is_refused(smoothing: float) -> None:
+    with pytest.raises(ValueError, match="more than 0 and at most 1"):
+        Affinity(smoothing)
+    with pytest.raises(ValueError, match="more than 0 and at most 1"):
+        Affinity().smoothing = smoothing
+
+
+def test_an_affinity_refuses_what_is_no_range() -> None:
+    with pytest.raises(ValueError, match="metres above 0, not -1"):
+        Affinity().similarity(0.5, -1)
+    with pytest.raises(ValueError, match="alpha lies from 0 to 1"):
+        Affinity().similarity(2.0)
