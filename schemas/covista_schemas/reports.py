@@ -172,7 +172,10 @@ Matrix = list[list[float]]
 
 
 class SimilarityReport(Report):
-    """The similarity matrix (Eq. 16), rows and columns in the order of `robots`; null is unknown."""
+    """The similarity matrix (Eq. 16), rows and columns in the order of `robots`; null is unknown.
+
+    Similarity is made from overlaps smoothed over keyframes (hysteresis.smoothing); `overlap` is the newest.
+    """
 
     revision: int
     robots: list[RobotId]
@@ -247,7 +250,7 @@ class LiveSettings(Report):
 
     alpha: float = Field(default=0.5, ge=0, le=1, description="Weight of the overlap against closeness, Eq. 16.")
     groups: Literal["auto"] | Annotated[int, Field(ge=1)] | GroupBounds = Field(
-        default="auto", description="auto, a number of groups, or bounds on it."
+        default="auto", description="auto, a number of groups, or bounds on it: {min, max}, both, 1 <= min <= max."
     )
     min_group_size: int = Field(default=1, ge=1, description="How many robots a group has at least.")
     sigma: Literal["shared", "std"] | Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False)] = Field(
@@ -275,9 +278,14 @@ class GroupsReport(Report):
     groups: list[Group]
     ungrouped: list[Ungrouped]
     criterion: str
-    scores: list[Score] = Field(description="Of every number of groups that was looked at, by the criterion.")
+    scores: list[Score] = Field(
+        description="Of every number of groups that was looked at, by the criterion; the highest is proposed."
+    )
     note: str | None = Field(
         default=None, description="Settings that so many robots cannot keep, or that are not meant for as many."
+    )
+    waiting: list[RobotId] = Field(
+        default=[], description="Robots of groups that others are proposed for, which are shown if that lasts."
     )
     settings: LiveSettings
 

@@ -58,7 +58,9 @@ def groups(report: GroupsReport) -> RenderableType:
     if best:
         lines.append(f"scores by number of groups: {', '.join(f'{each.groups}: {each.score:.3f}' for each in best)}")
         rest = len(report.scores) - len(best)
-        lines[-1] += f", and {rest} that are worse" if rest else ""
+        lines[-1] += f", and {rest} lower" if rest else ""
+    if report.waiting:
+        lines.append(f"another grouping is proposed, and shown if it lasts, for {' '.join(report.waiting)}")
     if report.note is not None:
         lines.append(f"note: {escape(report.note)}")
     return Group(table, *lines)

@@ -37,6 +37,7 @@ def groups_report(snapshot: Snapshot) -> reports.GroupsReport:
         criterion="components" if view.settings.grouping == "components" else view.settings.criterion,
         scores=[reports.Score(groups=groups, score=score) for groups, score in view.scores],
         note=view.note,
+        waiting=list(view.waiting),
         settings=_live_settings(view.settings),
     )
 

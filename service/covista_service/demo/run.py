@@ -68,6 +68,7 @@ def run(options: DemoOptions, screen: Screen) -> DemoReport | None:
         screen.line(f"docs     {ready.url}/docs")
         screen.line(f"zenoh    {', '.join(ready.link)}")
         watch = stack.enter_context(closing(Watch(ready.url)))
+        _warmed(watch, signals, screen)
         swarm = children.start(SWARM, options.swarm)
         stack.callback(swarm.end)
         feed = stack.enter_context(GroupsFeed(ready.link[0], options.swarm.site))
@@ -91,6 +92,14 @@ def _ready(station: Child, signals: Interruption) -> Ready | None:
         case Failed(text):
             raise DemoError(text)
     raise DemoError("the station ended while it was starting")
+
+
+def _warmed(watch: Watch, signals: Interruption, screen: Screen) -> None:
+    """Wait until the station has loaded what is compiled, and for as long as that may take where it is not yet."""
+    end_s = time.monotonic() + START_S
+    while not signals.count and time.monotonic() < end_s and not watch.ready():
+        screen.progress("loading what is compiled; the first time it is compiled, which takes a minute")
+        signals.wait([], POLL_S / 4)
 
 
 def _accuracy(options: SwarmOptions) -> Accuracy:

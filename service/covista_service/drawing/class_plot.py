@@ -13,7 +13,7 @@ _DASHES = ("-", "--", ":")
 _MARKS = ("o", "s", "^")
 _APART_IN = 0.19
 _HEIGHT_IN = 4.4
-_LETTER_IN = 0.09
+_LETTER_IN = 0.1
 
 
 def class_plot(classes: Sequence[str], series: Mapping[str, Sequence[float | None]], title: str, y_label: str) -> bytes:
@@ -28,7 +28,9 @@ def class_plot(classes: Sequence[str], series: Mapping[str, Sequence[float | Non
             heights = np.array([np.nan if value is None else value for value in values])
             lap = k // len(COLOURS)
             look, dash = _MARKS[lap % len(_MARKS)], _DASHES[lap % len(_DASHES)]
-            axes.plot(places, heights, look + dash, color=COLOURS[k % len(COLOURS)], markersize=5, linewidth=1.7)
+            colour = COLOURS[k % len(COLOURS)]
+            # The first of them, what the others are compared with, lies on top.
+            axes.plot(places, heights, look + dash, color=colour, markersize=5, lw=1.7, zorder=3 + len(series) - k)
             ends[name] = next((value for value in reversed(values) if value is not None), 0.0)
         axes.set(ylim=(-0.02, 1.02), xlim=(-0.3, len(classes) - 0.7), ylabel=y_label, title=title)
         axes.set_xticks(places, classes)

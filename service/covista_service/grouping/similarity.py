@@ -20,6 +20,7 @@ _TIGHTEST_M, _WIDEST_M = 1e-100, 1e100
 _SHARED = 0.25
 _PARTNERS = 2
 _REACH = 2.5
+_REACH_OF_NEAREST = 6.0
 # Up to so many links are looked at in turn, each for all robots at once.
 _FEW = 20
 # As near as the nearest, to rounding of squares.
@@ -32,9 +33,10 @@ def sigma_m(distance_m: Floats, mutual: Floats, sigma: Sigma) -> float:
     A number is taken as given. `std`, as printed, is the standard deviation of the N(N - 1)/2 distances: their mean
     where all are equal (two robots, an equilateral triangle). It is the size of the arena, so in a large swarm
     everybody is close to everybody. `shared` is 2.5 times the median distance from a robot to the two that it has most
-    in common with, of those who share more than a quarter. Where there are fewer than N/2 such partners, it is the
-    median distance to the nearest robot, halved where the two are known to share less. Where that is 0, for most stand
-    in one place, it is the mean of the matrix; 1 where all distances are 0.
+    in common with, of those who share more than a quarter. Where there are fewer than N/2 such partners, the nearest
+    robots tell: if N/4 at least are known to share little with theirs, so far is too far, and it is half the median of
+    those distances; else, with nothing known, 6 times the median distance to the nearest. Where that is 0, for most
+    stand in one place, it is the mean distance, and 1 where all stand there.
     """
     if sigma == "shared":
         return shared_sigma_m(np.square(distance_m), mutual)
@@ -79,8 +81,13 @@ def shared_sigma_m(squared_m2: Floats, mutual: Floats) -> float:
     count = len(squared_m2)
     if count < 2:
         return 1.0
-    partners_m, nearest_m = _companions(squared_m2, mutual)
-    sigma = _REACH * float(np.median(partners_m)) if 2 * len(partners_m) >= count else float(np.median(nearest_m))
+    partners_m, nearest_m, strange = _companions(squared_m2, mutual)
+    if 2 * len(partners_m) >= count:
+        sigma = _REACH * float(np.median(partners_m))
+    elif 4 * np.count_nonzero(strange) >= count:
+        sigma = float(np.median(nearest_m[strange])) / 2
+    else:
+        sigma = _REACH_OF_NEAREST * float(np.median(nearest_m))
     if sigma == 0:
         # Most stand in one place.
         sigma = float(np.sqrt(squared_m2).mean())
@@ -135,10 +142,14 @@ def _within(sigma_m: float) -> float:
 
 
 @compiled
-def _companions(squared_m2: Floats, mutual: Floats) -> tuple[Floats, Floats]:
-    """Distances of everybody's two partners, those who share enough; and how far everybody's nearest robot is (N,)."""
+def _companions(squared_m2: Floats, mutual: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Distances of everybody's two partners, those who share enough; and how far everybody's nearest robot is (N,).
+
+    And whether the two are known to share little, (N,): whoever of those as near it is.
+    """
     count = len(squared_m2)
-    partners, found, nearest = np.empty(_PARTNERS * count), 0, np.empty(count)
+    partners, found = np.empty(_PARTNERS * count), 0
+    nearest, strange = np.empty(count), np.empty(count, np.bool_)
     for i in range(count):
         first, second, one, other = _SHARED, _SHARED, -1, -1
         for j in range(count):
@@ -157,24 +168,21 @@ def _companions(squared_m2: Floats, mutual: Floats) -> tuple[Floats, Floats]:
             if partner >= 0:
                 partners[found] = squared_m2[i, partner]
                 found += 1
-        nearest[i] = _nearest_m2(squared_m2[i], mutual[i], i)
-    return np.sqrt(partners[:found]), np.sqrt(nearest)
+        nearest[i], strange[i] = _nearest(squared_m2[i], mutual[i], i)
+    return np.sqrt(partners[:found]), np.sqrt(nearest), strange
 
 
 @compiled
-def _nearest_m2(squared_m2: Floats, mutual: Floats, i: int) -> float:
-    """How far robot i's nearest is, squared, by squared distances (N,) and mutual overlaps (N,).
-
-    Half as far if the two are known to share little, whoever of those as near it is: so far is too far, then.
-    """
+def _nearest(squared_m2: Floats, mutual: Floats, i: int) -> tuple[float, bool]:
+    """How far robot i's nearest is, squared, by squared distances and mutual overlaps (N,); do they share little?"""
     near = np.inf
     for j in range(len(squared_m2)):
         if j != i:
             near = min(near, squared_m2[j])
     for j in range(len(squared_m2)):
         if j != i and squared_m2[j] <= _AS_NEAR * near and not mutual[j] <= _SHARED:
-            return near
-    return near / 4
+            return near, False
+    return near, True
 
 
 @compiled

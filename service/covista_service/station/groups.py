@@ -143,6 +143,8 @@ class Groups:
         self.view = replace(self.view, scores=proposal.scores, note=proposal.note)
         standing = self._weigh(proposal, now_ns)
         self._pending = standing.pending
+        waiting = {robot for change in standing.pending for group in change.before for robot in group}
+        self.view = replace(self.view, waiting=tuple(sorted(waiting)))
         following = follow(self._members, standing.clusters, self._next_label)
         self._next_label = following.next_label
         return following.groups

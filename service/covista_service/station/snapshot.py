@@ -115,7 +115,8 @@ class GroupView:
 class GroupsView:
     """The grouping in force since `time_ns`.
 
-    The scores of the numbers of groups, and a note on settings that cannot be kept, are as last evaluated.
+    As last evaluated: the scores of the numbers of groups, a note on settings that cannot be kept, and the robots of
+    groups that others are proposed for and not shown yet (`waiting`).
     """
 
     revision: int
@@ -125,6 +126,7 @@ class GroupsView:
     scores: tuple[tuple[int, float], ...]
     settings: GroupingOptions
     note: str | None = None
+    waiting: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

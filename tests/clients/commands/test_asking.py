@@ -71,10 +71,12 @@ def test_of_many_numbers_of_groups_the_best_are_shown_and_a_note_if_there_is_one
     run: Run, api: _Station, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scores = [Score(groups=m, score=1 / (1 + abs(m - 8))) for m in range(1, 21)]
-    report = sample.GROUPS.model_copy(update={"scores": scores, "note": "3 robots cannot form 4 groups"})
+    told = {"scores": scores, "note": "3 robots cannot form 4 groups", "waiting": ["r2"]}
+    report = sample.GROUPS.model_copy(update=told)
     assert isinstance(report, GroupsReport)
     monkeypatch.setitem(sample.ANSWERS, "/api/v1/groups", report)
     _, out, _ = run("groups", "--url", api.url)
     said = " ".join(out.split())
-    assert "6: 0.333, 7: 0.500, 8: 1.000, 9: 0.500, 10: 0.333, and 15 that are worse" in said
+    assert "6: 0.333, 7: 0.500, 8: 1.000, 9: 0.500, 10: 0.333, and 15 lower" in said
+    assert "another grouping is proposed, and shown if it lasts, for r2" in said
     assert "note: 3 robots cannot form 4 groups" in said

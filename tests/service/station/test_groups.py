@@ -174,11 +174,13 @@ def test_a_change_without_a_clear_gain_waits_until_it_has_lasted() -> None:
     scene = alone(hysteresis=STEADY, alpha=1.0)
     assert ("a1", "a2", "a3") in groups(scene).values()
     assert "split" not in drifts(scene, 0.0)
+    assert scene.snapshot.groups.waiting == ("a1", "a2", "a3")
     scene.wait(3.9)
     assert ("a1", "a2", "a3") in groups(scene).values()
     # Nothing new is heard: time alone brings it about.
     assert "split" in [kind for kind, _ in happenings(scene.wait(0.2))]
     assert ("a3",) in groups(scene).values()
+    assert scene.snapshot.groups.waiting == ()
 
 
 def test_a_change_that_is_taken_back_in_time_is_never_shown() -> None:
@@ -366,3 +368,12 @@ def test_large_swarms_are_evaluated_less_often() -> None:
         scene.send_pose("r000", pose(0.0))
         scene.wait(0.01)
     assert scene.snapshot.similarity.revision == revision + 2
+
+
+def test_before_anything_is_seen_clusters_of_positions_are_groups() -> None:
+    scene = Scene.of(grouping=GroupingOptions(hysteresis=HysteresisOptions(0.0, 0.0, 0.0)))
+    for cluster in range(4):
+        for number in range(5):
+            scene.send_pose(f"c{cluster}{number}", pose(20.0 * cluster + 0.2 * number))
+    scene.tick()
+    assert sorted(groups(scene).values()) == [tuple(f"c{k}{n}" for n in range(5)) for k in range(4)]

@@ -84,7 +84,7 @@ def _table(variant: str, found: Sequence[Figures]) -> Table:
     from rich.table import Table
 
     columns = {title: texts for title, texts in _columns(found).items() if any(texts)}
-    table = Table(title=f"{variant}: adjusted Rand index over {found[0].swarms} swarms")
+    table = Table(title=f"{variant}: adjusted Rand index over {found[0].swarms} swarm{'s' * (found[0].swarms != 1)}")
     table.add_column("method", no_wrap=True)
     for title in columns:
         table.add_column(title, justify="right")
