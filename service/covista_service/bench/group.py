@@ -11,7 +11,7 @@ from covista_schemas.errors import MissingExtraError
 from covista_service.bench import group_calls
 from covista_service.bench.group_calls import Call, affinity_of, swarm_of
 from covista_service.bench.group_swarm import affinity
-from covista_service.bench.row import Row, alternately_ms, median, spread
+from covista_service.bench.row import Row, alternately_ms, median, timed
 from covista_service.bench.threads import one_thread
 from covista_service.grouping.affinity import Affinity
 
@@ -84,17 +84,7 @@ def _row(case: str, mark_ms: float | None, times_ms: Sequence[float], peer_ms: S
         mark, holds = f"<= {mark_ms:g} ms", figure <= mark_ms
     if peer_ms is not None:
         mark, holds = f"{mark} and peer / {_FASTER:g}", holds and _FASTER * figure <= median(peer_ms)
-    return Row(
-        bench="group",
-        case=case,
-        median=figure,
-        spread=spread(times_ms),
-        unit="ms",
-        peer=None if peer_ms is None else PEER,
-        peer_median=None if peer_ms is None else median(peer_ms),
-        mark=mark,
-        holds=holds,
-    )
+    return timed("group", case, times_ms, mark, holds=holds, peer=PEER, peer_ms=peer_ms)
 
 
 def _peer(count: int) -> Call:

@@ -42,6 +42,30 @@ def spread(samples: Sequence[float]) -> float:
     return float(high - low)
 
 
+def timed(
+    bench: str,
+    case: str,
+    times_ms: Sequence[float],
+    mark: str,
+    *,
+    holds: bool,
+    peer: str,
+    peer_ms: Sequence[float] | None,
+) -> Row:
+    """A row of times; `peer` stands in it if its times are there."""
+    return Row(
+        bench=bench,
+        case=case,
+        median=median(times_ms),
+        spread=spread(times_ms),
+        unit="ms",
+        peer=None if peer_ms is None else peer,
+        peer_median=None if peer_ms is None else median(peer_ms),
+        mark=mark,
+        holds=holds,
+    )
+
+
 def alternately_ms(calls: Sequence[Callable[[], object]], rounds: int) -> list[list[float]]:
     """Times of each call, ms. They take turns, so that whatever else the machine does touches all alike.
 

@@ -8,7 +8,7 @@ from itertools import chain
 import cv2
 import numpy as np
 
-from covista_service.bench.row import Row, alternately_ms, median, spread
+from covista_service.bench.row import Row, alternately_ms, median, timed
 from covista_service.bench.scene import overlapping_pairs
 from covista_service.bench.threads import one_thread
 from covista_service.perception.camera import View, relative
@@ -69,17 +69,7 @@ def _stages(count: int, rounds: int) -> Iterator[Row]:
 def _row(
     case: str, times_ms: Sequence[float], mark: str, peer_ms: Sequence[float] | None = None, *, holds: bool
 ) -> Row:
-    return Row(
-        bench="survey",
-        case=case,
-        median=median(times_ms),
-        spread=spread(times_ms),
-        unit="ms",
-        peer=None if peer_ms is None else PEER,
-        peer_median=None if peer_ms is None else median(peer_ms),
-        mark=mark,
-        holds=holds,
-    )
+    return timed("survey", case, times_ms, mark, holds=holds, peer=PEER, peer_ms=peer_ms)
 
 
 def _ours(first: View, second: View) -> Call:

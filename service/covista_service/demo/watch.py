@@ -20,8 +20,11 @@ class Watch:
         self._client = httpx.Client(base_url=f"{url}/api/v1", timeout=_TIMEOUT_S)
 
     def ready(self) -> bool:
-        """Does the station say that it is ready?"""
-        return self._client.get(f"{self._url}/readyz").is_success
+        """Does the station say that it is ready? False where it does not answer in time, too."""
+        try:
+            return self._client.get(f"{self._url}/readyz").is_success
+        except httpx.HTTPError:
+            return False
 
     def groups(self) -> GroupsReport:
         """The groups that stand."""

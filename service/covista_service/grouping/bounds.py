@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from covista_service.compiled import compiled
-from covista_service.grouping.k_means import Labels
+from covista_service.grouping.k_means import Labels, dense
 from covista_service.grouping.similarity import Floats
 
 Groups = Literal["auto"] | int | tuple[int, int]
@@ -80,9 +80,9 @@ def with_least_size(S: Floats, labels: Labels, size: int, least: int) -> Labels:
     `least`; else it takes in, one by one, whom it suits best compared with the group that can spare him. Of groups as
     small that one does first which it suits best. Labels (N,) from 0 to M - 1, without gaps, in no order.
     """
-    enlarged = np.unique(labels, return_inverse=True)[1].astype(np.intp)
+    enlarged = dense(labels)
     _merge_smallest(S, enlarged, size, least)
-    enlarged = np.unique(enlarged, return_inverse=True)[1].astype(np.intp)
+    enlarged = dense(enlarged)
     _take_in(S, enlarged, size)
     return enlarged
 

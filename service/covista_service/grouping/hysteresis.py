@@ -18,10 +18,10 @@ from scipy.sparse.csgraph import connected_components
 
 from covista_service.compiled import compiled
 from covista_service.grouping.continuity import Grouping, Members
+from covista_service.grouping.k_means import Labels, dense
 from covista_service.grouping.scores import Contributions
 from covista_service.grouping.similarity import Floats
 
-_Labels = NDArray[np.intp]
 _Rows = NDArray[np.intp]
 _NS_PER_S = 1_000_000_000
 # Gains up to this share are rounding.
@@ -37,10 +37,10 @@ class HysteresisOptions:
     for long enough. A gain is clear if every robot that moves brings more than `clear` times what a robot contributes
     on average. By 1 a robot that is found in another place altogether moves at once, and one on the verge waits.
 
-    `persistence_s` outlasts a few keyframes, which come about once a second: noise seldom goes one way
-    for five of them, and who drives from group to group is between them for longer.
-    Evaluations may come ten times as often, but from the same keyframes. Of 3 s a flickering pair passes often, 8 s
-    leave a robot for as long in a group that it has left, and spare little more.
+    `persistence_s` outlasts a few keyframes, which come about once a second: noise seldom goes one way for five of
+    them, and who drives from group to group is between them for longer. Evaluations may come ten times as often, but
+    from the same keyframes. In 3 s a flickering pair passes often; 8 s leave a robot for as long in a group that it has
+    left, and spare little more.
     """
 
     gain: float = 0.05
@@ -66,7 +66,7 @@ class Standing:
 
 
 @compiled
-def held(S: Floats, labels: _Labels, gain: float) -> Floats:
+def held(S: Floats, labels: Labels, gain: float) -> Floats:
     """Similarities (N, N) with the groups on show (N,) mixed in: (1 - gain) s_ij, and gain more for those together."""
     mixed = np.empty_like(S)
     for i in range(len(S)):
@@ -79,7 +79,7 @@ def held(S: Floats, labels: _Labels, gain: float) -> Floats:
 def weigh(
     shown: Grouping,
     robots: Sequence[str],
-    labels: _Labels,
+    labels: Labels,
     contributions: Contributions,
     now_ns: int,
     options: HysteresisOptions,
@@ -112,24 +112,24 @@ def weigh(
         after[rows] = len(base) + proposed[rows]
         lasts = now_ns - change.since_ns >= options.persistence_s * _NS_PER_S
         wanted = options.clear * _moving(base[rows], proposed[rows])
-        if lasts or _clear(contributions(_dense(after)) - before, wanted, average):
+        if lasts or _clear(contributions(dense(after)) - before, wanted, average):
             result[rows] = after[rows]
         else:
             waiting.append(change)
     return _standing(robots, result, waiting)
 
 
-def _checked(robots: Sequence[str], labels: _Labels) -> _Labels:
+def _checked(robots: Sequence[str], labels: Labels) -> Labels:
     """Labels (N,) from 0 without a gap."""
     if labels.shape != (len(robots),):
         raise ValueError(f"{len(robots)} robots have as many labels, not {labels.shape}")
     if len(set(robots)) < len(robots):
         twice = sorted(robot for robot, times in Counter(robots).items() if times > 1)
         raise ValueError(f"every robot has one row: {', '.join(twice)} stands there more than once")
-    return _dense(labels)
+    return dense(labels)
 
 
-def _placed(shown: Grouping, robots: Sequence[str], proposed: _Labels) -> _Labels:
+def _placed(shown: Grouping, robots: Sequence[str], proposed: Labels) -> Labels:
     """Labels (N,) of the groups on show without those who have left and with those who are new.
 
     The newcomers of a proposed group go into the group on show that shares most robots with it (among equals the
@@ -144,10 +144,10 @@ def _placed(shown: Grouping, robots: Sequence[str], proposed: _Labels) -> _Label
         shared = Counter(base[inside & ~new].tolist())
         best = min(shared, key=lambda group: (-shared[group], len(groups[group]), min(groups[group])), default=None)
         base[inside & new] = len(groups) + label if best is None else best
-    return _dense(base)
+    return dense(base)
 
 
-def _changes(base: _Labels, proposed: _Labels) -> list[_Rows]:
+def _changes(base: Labels, proposed: Labels) -> list[_Rows]:
     """Rows of each change: of the components of the graph in which groups of both that share robots are neighbours."""
     groups, wanted = base.max(initial=-1) + 1, proposed.max(initial=-1) + 1
     edges = np.divmod(np.unique(base * wanted + proposed), wanted)
@@ -161,9 +161,9 @@ def _changes(base: _Labels, proposed: _Labels) -> list[_Rows]:
     return [np.flatnonzero(component[base] == each) for each in changed]
 
 
-def _moving(before: _Labels, after: _Labels) -> int:
+def _moving(before: Labels, after: Labels) -> int:
     """How many of n robots stand elsewhere, labels (n,), if as many as can be stay where they are."""
-    old, new = _dense(before), _dense(after)
+    old, new = dense(before), dense(after)
     shared = np.zeros((int(old.max()) + 1, int(new.max()) + 1))
     np.add.at(shared, (old, new), 1.0)
     return len(before) - int(shared[linear_sum_assignment(shared, maximize=True)].sum())
@@ -177,7 +177,7 @@ def _clear(gains: Floats, wanted: float, average: float) -> bool:
     return average > 0 and float(gains.sum()) > max(wanted, _NOTHING) * average
 
 
-def _groups(robots: Sequence[str], labels: _Labels, rows: _Rows) -> frozenset[Members]:
+def _groups(robots: Sequence[str], labels: Labels, rows: _Rows) -> frozenset[Members]:
     """The groups that the robots of `rows` stand in."""
     members: defaultdict[int, list[str]] = defaultdict(list)
     for row, label in zip(rows.tolist(), labels[rows].tolist(), strict=True):
@@ -191,12 +191,6 @@ def _among(change: Pending, robots: Members) -> tuple[frozenset[Members], frozen
     return before - {frozenset()}, after - {frozenset()}
 
 
-def _standing(robots: Sequence[str], labels: _Labels, waiting: Iterable[Pending] = ()) -> Standing:
+def _standing(robots: Sequence[str], labels: Labels, waiting: Iterable[Pending] = ()) -> Standing:
     clusters = _groups(robots, labels, np.arange(len(robots)))
     return Standing(tuple(sorted(clusters, key=lambda members: min(members))), tuple(waiting))
-
-
-def _dense(labels: _Labels) -> _Labels:
-    """The same groups with labels (N,) from 0 without a gap."""
-    dense: _Labels = np.unique(labels, return_inverse=True)[1]
-    return dense

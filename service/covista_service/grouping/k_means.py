@@ -32,6 +32,11 @@ def k_means(rows: Floats, m: int, starts: NDArray[np.intp]) -> Labels:
     return canonical(best, m)
 
 
+def dense(labels: Labels) -> Labels:
+    """The same groups with labels (N,) from 0 without a gap, whatever numbers they had."""
+    return np.unique(labels, return_inverse=True)[1].astype(np.intp)
+
+
 @compiled
 def canonical(labels: Labels, m: int) -> Labels:
     """The same m groups, numbered in the order of their first robots; `labels` (N,) lie from 0 to m - 1."""

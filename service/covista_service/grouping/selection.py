@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal, get_args
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from covista_service.compiled import compiled
 from covista_service.grouping import merging, moves, scores
 from covista_service.grouping.bounds import Bounds, Groups, with_least_size
-from covista_service.grouping.k_means import Labels, canonical
+from covista_service.grouping.k_means import Labels, canonical, dense
 from covista_service.grouping.scores import Contributions, outsider
 from covista_service.grouping.similarity import Floats
 from covista_service.grouping.spectral import Spectrum, partition
@@ -96,8 +97,8 @@ def choose(S: Floats, options: SelectionOptions, start: Labels | None = None) ->
     """Part the robots of a similarity matrix (N, N) into the number of groups with the highest score.
 
     Ties go to the smaller number; by gain they move nobody. No robots have no groups and no scores. `start` (N,) are
-    labels from 0 to N - 1 that gain begins with. Raises ValueError for a matrix that is not symmetric, from 0 to 1 and
-    1 on its diagonal, and for bounds that no grouping satisfies.
+    labels, any whole numbers, that gain begins with. Raises ValueError for a matrix that is not symmetric, from 0 to 1
+    and 1 on its diagonal, for labels that do not fit it, and for bounds that no grouping satisfies.
     """
     S = np.ascontiguousarray(S, np.float64)
     _check(S)
@@ -126,8 +127,9 @@ def contributions(S: Floats, options: SelectionOptions) -> Contributions:
     """
     criterion = options.criterion
     if criterion == "gain":
-        expected = scores.expectations(S, options.stranger, GAIN)
-        return lambda labels: scores.gain(S, labels, expected)
+        # Computed once, and only if somebody asks.
+        expected = cache(lambda: scores.expectations(S, options.stranger, GAIN))
+        return lambda labels: scores.gain(S, labels, expected())
     if criterion == "modularity":
         return lambda labels: scores.modularity(S, labels)
     if criterion in ("fiedler", "paper"):
@@ -241,7 +243,7 @@ def _by_eigengap(S: Floats, options: SelectionOptions, numbers: range) -> Choice
 def _by_gain(S: Floats, options: SelectionOptions, numbers: range, start: Labels | None) -> Choice:
     """Where local moves end; parted further by Ng-Jordan-Weiss, or merged, as far as the bounds demand."""
     expected = scores.expectations(S, options.stranger, GAIN)
-    labels = moves.settle(S, expected, np.arange(len(S)) if start is None else _dense(start))
+    labels = moves.settle(S, expected, np.arange(len(S)) if start is None else dense(start))
     if labels.max() + 1 < numbers.start:
         labels = partition(Spectrum.of(S, numbers.start), numbers.start)
     labels = canonical(_sized(S, labels, options, numbers), len(S))
@@ -257,10 +259,10 @@ def _by_gain(S: Floats, options: SelectionOptions, numbers: range, start: Labels
 def _compare(found: _Found, groupings: Iterable[Labels], score_of: Contributions) -> None:
     """Enter groupings where they score best of those with as many groups."""
     for labels in groupings:
-        dense = canonical(labels, len(labels))
-        formed, score = int(dense.max()) + 1, float(score_of(dense).sum())
+        named = canonical(labels, len(labels))
+        formed, score = int(named.max()) + 1, float(score_of(named).sum())
         if formed not in found or score > found[formed][0]:
-            found[formed] = (score, dense)
+            found[formed] = (score, named)
 
 
 def _told(found: _Found) -> dict[int, float]:
@@ -299,8 +301,3 @@ def _sized(S: Floats, labels: Labels, options: SelectionOptions, numbers: range)
     if options.min_group_size == 1:
         return labels
     return with_least_size(S, labels, options.min_group_size, numbers.start)
-
-
-def _dense(labels: Labels) -> Labels:
-    """Any labels (N,) as numbers from 0 without a gap."""
-    return np.unique(labels, return_inverse=True)[1].astype(np.intp)

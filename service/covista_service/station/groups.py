@@ -11,7 +11,7 @@ from covista_service.grouping.affinity import Affinity
 from covista_service.grouping.bounds import Bounds
 from covista_service.grouping.continuity import Change, Members, changes, follow
 from covista_service.grouping.hysteresis import HysteresisOptions, Pending, Standing, weigh
-from covista_service.grouping.k_means import Labels
+from covista_service.grouping.k_means import Labels, dense
 from covista_service.grouping.similarity import Floats
 from covista_service.station.events import Effect, GroupsChanged, Happened, Pair
 from covista_service.station.options import GroupingOptions, StationOptions, nanoseconds
@@ -139,7 +139,7 @@ class Groups:
         S = affinity.similarity(options.alpha, sigma_m)
         matrices = (_frozen(matrix) for matrix in (S, affinity.overlap, affinity.squared_m2))
         self.similarity = SimilarityView(self.similarity.revision + 1, affinity.robots, sigma_m, *matrices)
-        proposal = propose(affinity, S, options, None if self._set_anew else self._shown())
+        proposal = propose(affinity, S, sigma_m, options, None if self._set_anew else self._shown())
         self.view = replace(self.view, scores=proposal.scores, note=proposal.note)
         standing = self._weigh(proposal, now_ns)
         self._pending = standing.pending
@@ -154,7 +154,7 @@ class Groups:
         rows = {label: row for row, label in enumerate(self._members)}
         labels = [rows.get(self._label_of.get(robot, ""), -1) for robot in self._affinity.robots]
         new = len(rows) + np.arange(len(labels))
-        return np.unique(np.where(np.array(labels, np.intp) < 0, new, labels), return_inverse=True)[1].astype(np.intp)
+        return dense(np.where(np.array(labels, np.intp) < 0, new, labels))
 
     def _weigh(self, proposal: Proposal, now_ns: int) -> Standing:
         robots, options = self._affinity.robots, self.view.settings.hysteresis

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from covista_service.grouping import selection
 from covista_service.grouping.affinity import Affinity
 from covista_service.grouping.bounds import Bounds
@@ -32,8 +30,8 @@ class Proposal:
     bounds: Bounds
 
 
-def propose(affinity: Affinity, S: Floats, options: GroupingOptions, shown: Labels | None) -> Proposal:
-    """Group the robots of an affinity by their similarity S (N, N).
+def propose(affinity: Affinity, S: Floats, sigma_m: float, options: GroupingOptions, shown: Labels | None) -> Proposal:
+    """Group the robots of an affinity by their similarity S (N, N), `sigma_m` being the range it was made with.
 
     Bounds that so many robots cannot keep are loosened, and the note says so. `shown` (N,) are the groups on show, to
     hold on to.
@@ -42,7 +40,7 @@ def propose(affinity: Affinity, S: Floats, options: GroupingOptions, shown: Labe
     alpha = options.alpha
     if options.grouping == "distance":
         alpha = 0.0
-        S = affinity.similarity(alpha, options.sigma)
+        S = affinity.similarity(alpha, sigma_m)
     if shown is not None:
         S = held(S, shown, options.hysteresis.gain)
     asked = Bounds(options.groups, options.min_group_size)
@@ -54,8 +52,7 @@ def propose(affinity: Affinity, S: Floats, options: GroupingOptions, shown: Labe
         chosen_by = replace(chosen_by, criterion="silhouette")
         contributions = selection.contributions(S, chosen_by)
         labels = components(S, LINK, bounds)
-        formed = len(np.unique(labels))
-        scores = ((formed, float(contributions(labels).sum())),) if count else ()
+        scores = ((int(labels.max()) + 1, float(contributions(labels).sum())),) if count else ()
         return Proposal(labels, scores, note, contributions, bounds)
     choice = selection.choose(S, chosen_by, shown)
     return Proposal(choice.labels, choice.scores, note, selection.contributions(S, chosen_by), bounds)

@@ -5,6 +5,7 @@ import pytest
 from covista_service.grouping import scores
 from covista_service.grouping.k_means import canonical
 from covista_service.grouping.moves import settle
+from covista_service.grouping.selection import GAIN
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -123,8 +124,8 @@ def hazy(seed: int, count: int) -> Floats:
     return planted(seed, (count - 5, 3, 2), (0.3, 0.8), (0.0, 0.5))[0]
 
 
-# Measured over 400 such swarms of 8 robots each, from all alone: scattered .25 % miss the best partition, hazy 1 %,
-# jumbled 20 %, sparse 18 %; and these lose a twentieth of the gain at the median.
+# Measured over 400 such swarms of 8 robots each, from all alone: scattered never miss the best partition, hazy .5 %,
+# jumbled 15 %, sparse 18 %; those lose 3 to 7 % of the gain at the median.
 @pytest.mark.parametrize(
     ("kind", "missed", "lost"), [(scattered, 0.05, 0.01), (hazy, 0.05, 0.01), (jumbled, 0.3, 0.02), (sparse, 0.3, 0.03)]
 )
@@ -132,7 +133,7 @@ def test_the_gain_comes_close_to_the_best_of_all_partitions(kind, missed: float,
     short = []
     for seed in range(100):
         S = kind(seed, 8)
-        expected = scores.expectations(S, STRANGER, 0.65)
+        expected = scores.expectations(S, STRANGER, GAIN)
         best = gains(S, expected, all_partitions(8)).max()
         reached = scores.gain(S, settle(S, expected, np.arange(8)), expected).sum()
         assert reached <= best + 1e-9

@@ -16,7 +16,7 @@ from scipy.spatial.distance import pdist, squareform
 from covista_service.drawing import timeline
 from covista_service.grouping.continuity import Grouping, follow
 from covista_service.grouping.hysteresis import HysteresisOptions, Pending, held, weigh
-from covista_service.grouping.k_means import Labels
+from covista_service.grouping.k_means import Labels, dense
 from covista_service.grouping.selection import Criterion, SelectionOptions, choose, contributions
 from covista_service.grouping.similarity import Floats, matrix
 
@@ -146,7 +146,7 @@ def labels_over_time(
         shown, next_label = following.groups, following.next_label
         label_of = {robot: int(label[1:]) for label, members in shown.items() for robot in members}
         numbers[t] = [label_of[robot] for robot in robots]
-        before = np.unique(numbers[t], return_inverse=True)[1]
+        before = dense(numbers[t])
     return numbers
 
 

@@ -79,6 +79,9 @@ def _figures(trials: Sequence[Trial], largest: int) -> Figures:
         values = [trial.groups == trial.true_groups for trial in trials if trial.kind == kind]
         return float(np.mean(values)) if values else None
 
+    def of_kind(kind: str) -> float | None:
+        return mean(lambda trial: trial.kind == kind)
+
     every = [trial.ari for trial in trials]
     kinds = [kind for kind in dict.fromkeys((*STORIES, *(t.kind for t in trials))) if kind not in _UNUSUAL]
     return Figures(
@@ -89,7 +92,7 @@ def _figures(trials: Sequence[Trial], largest: int) -> Figures:
         float(np.quantile(every, 0.1)),
         {name: within(*bounds) for name, bounds in size_classes(largest).items()},
         within(ABOVE + 1, largest),
-        {kind: mean(lambda trial, kind=kind: trial.kind == kind) for kind in kinds},  # type: ignore[misc]
+        {kind: of_kind(kind) for kind in kinds},
         kept("one"),
         kept("apart"),
         float(np.median([trial.ms for trial in trials])),
