@@ -65,6 +65,22 @@ class Source(Protocol):
         """Events of up to `limit` robots, and whether there are more."""
 
 
+@dataclass(frozen=True, slots=True)
+class CrewStatus:
+    """How those are who do the heavy work: `capacity` jobs at a time, by `kind` (threads, processes, dask).
+
+    `fallback` says why they work here and not where they should, None if they do; `lost` workers died since the start,
+    and `retried` jobs had to be done again for it.
+    """
+
+    kind: str
+    capacity: int
+    warm: bool = True
+    fallback: str | None = None
+    lost: int = 0
+    retried: int = 0
+
+
 class Crew(Protocol):
     """Who does the heavy work."""
 

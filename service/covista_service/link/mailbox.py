@@ -42,6 +42,15 @@ class Letter:
         return self.boot, self.sequence
 
 
+@dataclass(frozen=True, slots=True)
+class Depths:
+    """What waits in all mailboxes: robots with mail, names of messages, and bytes of payload."""
+
+    robots: int
+    messages: int
+    payload_bytes: int
+
+
 @dataclass(slots=True)
 class Refusal:
     """Messages refused for one reason since the last drain."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Literal
 
@@ -22,6 +22,7 @@ from covista_service.station.options import NS_PER_S, GroupingOptions
 from covista_service.station.outlooks import Outlook, Ratios
 from covista_service.station.pairs import PairRecord, pair_of
 from covista_service.station.roster import Fix
+from covista_service.station.workload import Workload
 
 Reason = Literal["no_pose", "gone"]
 
@@ -140,6 +141,7 @@ class Snapshot:
     records: Mapping[Pair, PairRecord]
     decay_after_ns: int
     unknown_after_ns: int
+    workload: Workload = field(default_factory=Workload)
 
     def group_of(self, robot: str) -> GroupView | None:
         """The group that a robot stands in."""
