@@ -70,9 +70,10 @@ def held(S: Floats, labels: Labels, gain: float) -> Floats:
     """Similarities (N, N) with the groups on show (N,) mixed in: (1 - gain) s_ij, and gain more for those together."""
     mixed = np.empty_like(S)
     for i in range(len(S)):
-        for j in range(len(S)):
-            mixed[i, j] = (1 - gain) * S[i, j] + (gain if labels[i] == labels[j] else 0.0)
         mixed[i, i] = 1.0
+        # Computed once for both: compiled for many columns at a time it need not round as for the few that are left.
+        for j in range(i):
+            mixed[i, j] = mixed[j, i] = (1 - gain) * S[i, j] + (gain if labels[i] == labels[j] else 0.0)
     return mixed
 
 

@@ -275,3 +275,14 @@ def test_groups_on_show_mix_into_the_similarity(seed: int, count: int, gain: flo
     np.testing.assert_array_equal(mixed, mixed.T)
     np.testing.assert_array_equal(np.diag(mixed), 1.0)
     np.testing.assert_array_equal(held(S, labels, 0.0), S)
+
+
+@pytest.mark.parametrize("robots", [2, 7, 26, 63, 100])
+def test_what_is_mixed_is_symmetric_to_the_last_bit(robots: int) -> None:
+    rng = np.random.default_rng(robots)
+    S = np.tril(rng.random((robots, robots)), -1)
+    S = S + S.T + np.eye(robots)
+    for gain in (0.05, 0.3, 0.9):
+        mixed = held(S, rng.integers(0, robots // 3 + 1, robots), gain)
+        np.testing.assert_array_equal(mixed, mixed.T)
+        np.testing.assert_array_equal(np.diag(mixed), 1.0)
