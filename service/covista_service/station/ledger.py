@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections import Counter, OrderedDict
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 MessageId = tuple[str, int]
@@ -13,6 +13,8 @@ MessageId = tuple[str, int]
 MAX_INTERVALS = 1024
 # Of older boots only the number of missing messages is kept.
 MAX_BOOTS = 8
+# What became of messages whose fate was open when their robot was forgotten.
+FORGOTTEN = "forgotten"
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +31,24 @@ class Counts:
     missing: int = 0
     waiting: int = 0
     dropped: Mapping[str, int] = field(default_factory=dict)
+
+    def __add__(self, other: Counts) -> Counts:
+        """Both accounts as one."""
+        return Counts(
+            self.received + other.received,
+            self.used + other.used,
+            self.replaced + other.replaced,
+            self.duplicate + other.duplicate,
+            self.missing + other.missing,
+            self.waiting + other.waiting,
+            {code: self.dropped.get(code, 0) + other.dropped.get(code, 0) for code in {*self.dropped, *other.dropped}},
+        )
+
+    def closed(self) -> Counts:
+        """The accounts when nothing more can become of what waits: that is dropped, for its robot is forgotten."""
+        if not self.waiting:
+            return self
+        return replace(self, waiting=0) + Counts(dropped={FORGOTTEN: self.waiting})
 
 
 class Sequences:

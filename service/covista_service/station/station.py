@@ -101,6 +101,7 @@ class Station:
                 self._pairs.records(),
                 nanoseconds(self.options.decay_after_s),
                 self._unknown_after_ns,
+                forgotten=self._roster.forgotten,
             )
         return replace(self._snapshot, now_ns=now_ns)
 

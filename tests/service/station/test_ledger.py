@@ -2,7 +2,7 @@
 
 from collections import Counter
 
-from covista_service.station.ledger import MAX_BOOTS, MAX_INTERVALS, Counts, Ledger, Sequences
+from covista_service.station.ledger import FORGOTTEN, MAX_BOOTS, MAX_INTERVALS, Counts, Ledger, Sequences
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -120,3 +120,25 @@ def test_boots_without_end_take_no_more_room_and_stay_counted() -> None:
         ledger.hear([(f"b{boot}", 0), (f"b{boot}", 2)], None)
     assert ledger.counts() == Counts(received=6 * MAX_BOOTS, replaced=6 * MAX_BOOTS, missing=3 * MAX_BOOTS)
     assert len(ledger._boots) == MAX_BOOTS
+
+
+accounts = st.builds(
+    Counts,
+    *[st.integers(0, 9)] * 6,
+    dropped=st.dictionaries(st.sampled_from(["bad_pose", "overflow", FORGOTTEN]), st.integers(1, 9)),
+)
+
+
+@given(accounts, accounts, accounts)
+def test_accounts_add_up_in_any_order(a: Counts, b: Counts, c: Counts) -> None:
+    assert a + b == b + a
+    assert (a + b) + c == a + (b + c)
+    assert a + Counts() == a
+
+
+@given(accounts)
+def test_closed_accounts_wait_for_nothing_and_balance_as_before(counts: Counts) -> None:
+    closed = counts.closed()
+    assert closed.waiting == 0
+    assert balanced(closed) == balanced(counts)
+    assert closed.closed() == closed

@@ -2,9 +2,10 @@
 
 import pytest
 from covista_schemas.reports import Status
-from covista_service.station.events import MessageDropped, TokenLost, TokenSeen
+from covista_service.station.events import ExtractFeatures, FeaturesExtracted, MessageDropped, TokenLost, TokenSeen
+from covista_service.station.ledger import FORGOTTEN, Counts
 
-from tests.service.station.scenes import START_NS, S, Scene, happenings, pose
+from tests.service.station.scenes import FEATURES, START_NS, S, Scene, happenings, pose
 
 
 def status(scene: Scene, robot: str = "r1") -> Status:
@@ -147,3 +148,27 @@ def test_times_of_presence_are_settings() -> None:
     assert states[2] is Status.GONE
     scene.wait(1)
     assert "r1" not in scene.snapshot.robots
+
+
+def test_a_forgotten_robot_leaves_its_accounts_behind() -> None:
+    scene = Scene.of(live_after_s=1, gone_after_s=2, forget_after_s=4)
+    for _ in range(2):
+        scene.send("r1")
+        scene.send_pose("r1", pose())
+        scene.settle()
+        scene.wait(2)
+        assert "r1" in scene.snapshot.robots
+        scene.wait(2)
+        assert "r1" not in scene.snapshot.robots
+    # Of the second life the first message is missing, as of any robot that sent before the station heard of it.
+    assert scene.snapshot.forgotten["keyframe"] == Counts(received=2, used=2, missing=1)
+    assert scene.snapshot.forgotten["pose"] == Counts(received=2, used=2, missing=1)
+
+
+def test_a_picture_whose_robot_is_forgotten_meanwhile_is_dropped() -> None:
+    scene = Scene.of(live_after_s=1, gone_after_s=2, forget_after_s=4)
+    (job,) = scene.send("r1", image=True)
+    assert isinstance(job, ExtractFeatures)
+    scene.wait(4)
+    scene.receive(FeaturesExtracted(job.keyframe.id, FEATURES))
+    assert scene.snapshot.forgotten["keyframe"] == Counts(received=1, dropped={FORGOTTEN: 1})
