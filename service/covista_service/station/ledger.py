@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections import Counter, OrderedDict
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
 MessageId = tuple[str, int]
@@ -32,23 +32,31 @@ class Counts:
     waiting: int = 0
     dropped: Mapping[str, int] = field(default_factory=dict)
 
-    def __add__(self, other: Counts) -> Counts:
-        """Both accounts as one."""
-        return Counts(
-            self.received + other.received,
-            self.used + other.used,
-            self.replaced + other.replaced,
-            self.duplicate + other.duplicate,
-            self.missing + other.missing,
-            self.waiting + other.waiting,
-            {code: self.dropped.get(code, 0) + other.dropped.get(code, 0) for code in {*self.dropped, *other.dropped}},
-        )
 
-    def closed(self) -> Counts:
-        """The accounts when nothing more can become of what waits: that is dropped, for its robot is forgotten."""
-        if not self.waiting:
-            return self
-        return replace(self, waiting=0) + Counts(dropped={FORGOTTEN: self.waiting})
+@dataclass(slots=True, eq=False)
+class Total:
+    """Accounts of several ledgers as one."""
+
+    fates: Counter[str] = field(default_factory=Counter)
+    dropped: Counter[str] = field(default_factory=Counter)
+    missing: int = 0
+    waiting: int = 0
+
+    def copy(self) -> Total:
+        """The same, to go on from."""
+        return Total(self.fates.copy(), self.dropped.copy(), self.missing, self.waiting)
+
+    def counts(self) -> Counts:
+        """As they are told."""
+        return Counts(
+            received=self.fates["received"],
+            used=self.fates["used"],
+            replaced=self.fates["replaced"],
+            duplicate=self.fates["duplicate"],
+            missing=self.missing,
+            waiting=self.waiting,
+            dropped=dict(self.dropped),
+        )
 
 
 class Sequences:
@@ -152,17 +160,27 @@ class Ledger:
             del self._announced[message]
             self._dropped[code] += 1
 
+    def close(self) -> None:
+        """The robot is forgotten: nothing more can become of what waits."""
+        if waiting := len(self._announced) + len(self._open):
+            self._dropped[FORGOTTEN] += waiting
+        self._announced.clear()
+        self._open.clear()
+
+    def add_to(self, total: Total) -> None:
+        """Add these accounts to those of others."""
+        for fate, count in self._counts.items():
+            total.fates[fate] += count
+        for code, count in self._dropped.items():
+            total.dropped[code] += count
+        total.missing += self._missing_before + sum(sequences.missing for sequences in self._boots.values())
+        total.waiting += len(self._announced) + len(self._open)
+
     def counts(self) -> Counts:
         """The accounts now."""
-        return Counts(
-            received=self._counts["received"],
-            used=self._counts["used"],
-            replaced=self._counts["replaced"],
-            duplicate=self._counts["duplicate"],
-            missing=self._missing_before + sum(sequences.missing for sequences in self._boots.values()),
-            waiting=len(self._announced) + len(self._open),
-            dropped=dict(self._dropped),
-        )
+        total = Total()
+        self.add_to(total)
+        return total.counts()
 
     def _sequences(self, boot: str) -> Sequences:
         if boot not in self._boots:

@@ -137,6 +137,9 @@ class Pairs:
         """All records now, as a copy."""
         return dict(self._records)
 
+    def __len__(self) -> int:
+        return len(self._records)
+
 
 def _same(held: Answer, answer: Answer) -> bool:
     """Do two answers rest on the same keyframes in the same way?"""

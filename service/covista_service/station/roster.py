@@ -10,7 +10,7 @@ from covista_schemas.reports import Status
 
 from covista_service.perception.camera import Pose
 from covista_service.station.events import Keyframe, KeyframeId, Topic
-from covista_service.station.ledger import Counts, Ledger
+from covista_service.station.ledger import Counts, Ledger, Total
 from covista_service.station.options import StationOptions, nanoseconds
 from covista_service.station.prospects import Depth
 
@@ -112,12 +112,15 @@ class Roster:
         self._gone_after_ns = nanoseconds(options.live_after_s + options.gone_after_s)
         self._forget_after_ns = nanoseconds(options.forget_after_s)
         self._robots: dict[str, Robot] = {}
-        self._forgotten: dict[Topic, Counts] = {"keyframe": Counts(), "pose": Counts()}
+        self._forgotten: dict[Topic, Total] = {"keyframe": Total(), "pose": Total()}
 
-    @property
-    def forgotten(self) -> dict[Topic, Counts]:
-        """The accounts of all robots that were forgotten, by topic: with those of the others they never fall."""
-        return dict(self._forgotten)
+    def accounts(self) -> dict[Topic, Counts]:
+        """The accounts of all robots by topic, those that are forgotten included."""
+        totals = {topic: total.copy() for topic, total in self._forgotten.items()}
+        for robot in self._robots.values():
+            for topic, ledger in robot.ledgers.items():
+                ledger.add_to(totals[topic])
+        return {topic: total.counts() for topic, total in totals.items()}
 
     def __iter__(self) -> Iterator[Robot]:
         return iter(self._robots.values())
@@ -139,9 +142,10 @@ class Roster:
         return self._robots[robot]
 
     def forget(self, robot: str) -> None:
-        """Drop all that is known of a robot, but for what it adds to the accounts of the forgotten."""
+        """Drop all that is known of a robot, but for what it adds to the accounts of all."""
         for topic, ledger in self._robots.pop(robot).ledgers.items():
-            self._forgotten[topic] += ledger.counts().closed()
+            ledger.close()
+            ledger.add_to(self._forgotten[topic])
 
     def token_seen(self, robot: str, boot: str, now_ns: int) -> None:
         """A liveliness token is there."""

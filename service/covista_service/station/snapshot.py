@@ -16,7 +16,7 @@ from covista_service.perception.certainty import Interval
 from covista_service.perception.comparison import Comparison
 from covista_service.perception.visibility import SAME_SCALE
 from covista_service.station.corrections import Correction
-from covista_service.station.events import Keyframe, KeyframeId, Pair, Topic
+from covista_service.station.events import Keyframe, KeyframeId, Pair
 from covista_service.station.ledger import Counts
 from covista_service.station.options import NS_PER_S, GroupingOptions
 from covista_service.station.outlooks import Outlook, Ratios
@@ -132,10 +132,7 @@ class GroupsView:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
-    """The station as of `now_ns`: ages and decay follow from the moment it was taken.
-
-    `forgotten` are the accounts of robots that are not known any more, by topic.
-    """
+    """The station as of `now_ns`: ages and decay follow from the moment it was taken."""
 
     now_ns: int
     robots: Mapping[str, RobotView]
@@ -145,7 +142,6 @@ class Snapshot:
     decay_after_ns: int
     unknown_after_ns: int
     workload: Workload = field(default_factory=Workload)
-    forgotten: Mapping[Topic, Counts] = field(default_factory=dict)
 
     def group_of(self, robot: str) -> GroupView | None:
         """The group that a robot stands in."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 
 from covista_schemas.reports import EventKind, Status
 
 from covista_service.perception.camera import Pose
 from covista_service.station import prospects
+from covista_service.station.census import Census
 from covista_service.station.events import (
     Effect,
     Event,
@@ -33,6 +35,10 @@ from covista_service.station.pairs import Pairs, pair_of
 from covista_service.station.roster import Robot, Roster
 from covista_service.station.snapshot import RobotView, Snapshot
 from covista_service.station.surveys import Read, Surveys
+from covista_service.station.workload import Workload
+
+# A clock further off than this is worth a look.
+_CLOCK_OFF_NS = nanoseconds(10)
 
 
 class Station:
@@ -101,9 +107,29 @@ class Station:
                 self._pairs.records(),
                 nanoseconds(self.options.decay_after_s),
                 self._unknown_after_ns,
-                forgotten=self._roster.forgotten,
+                self._workload(),
             )
         return replace(self._snapshot, now_ns=now_ns)
+
+    def census(self) -> Census:
+        """The station in numbers, as of the last Tick where time matters."""
+        view, robots = self._groups.view, list(self._roster)
+        return Census(
+            accounts=self._roster.accounts(),
+            robots=Counter(robot.status or Status.LIVE for robot in robots),
+            ungrouped=Counter(reason for _, reason in view.ungrouped),
+            clocks_off=sum(abs(robot.clock_offset_ns or 0) > _CLOCK_OFF_NS for robot in robots),
+            groups=len(view.groups),
+            revision=view.revision,
+            matrix_revision=self._groups.similarity.revision,
+            keyframes=sum(robot.keyframe is not None for robot in robots),
+            pairs=len(self._pairs),
+            workload=self._workload(),
+        )
+
+    def _workload(self) -> Workload:
+        """What waits and what was done."""
+        return Workload()
 
     def _token(self, event: TokenSeen | TokenLost, now_ns: int) -> None:
         if isinstance(event, TokenSeen):

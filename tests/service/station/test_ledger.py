@@ -2,7 +2,15 @@
 
 from collections import Counter
 
-from covista_service.station.ledger import FORGOTTEN, MAX_BOOTS, MAX_INTERVALS, Counts, Ledger, Sequences
+from covista_service.station.ledger import (
+    FORGOTTEN,
+    MAX_BOOTS,
+    MAX_INTERVALS,
+    Counts,
+    Ledger,
+    Sequences,
+    Total,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -122,23 +130,54 @@ def test_boots_without_end_take_no_more_room_and_stay_counted() -> None:
     assert len(ledger._boots) == MAX_BOOTS
 
 
-accounts = st.builds(
-    Counts,
-    *[st.integers(0, 9)] * 6,
-    dropped=st.dictionaries(st.sampled_from(["bad_pose", "overflow", FORGOTTEN]), st.integers(1, 9)),
+steps = st.tuples(
+    st.integers(0, 2),
+    st.sampled_from(["announce", "take", "settle", "reject", "unreadable", "broken", "close"]),
+    st.integers(0, 9),
 )
 
 
-@given(accounts, accounts, accounts)
-def test_accounts_add_up_in_any_order(a: Counts, b: Counts, c: Counts) -> None:
-    assert a + b == b + a
-    assert (a + b) + c == a + (b + c)
-    assert a + Counts() == a
+@given(st.lists(steps, max_size=60))
+def test_totals_are_sums_and_never_fall_when_a_ledger_is_closed(steps: list[tuple]) -> None:
+    closed, ledgers, before = Total(), [Ledger() for _ in range(3)], Counts()
+    for which, step, number in steps:
+        enter(ledgers[which], step, number)
+        if step == "close":
+            ledgers[which].add_to(closed)
+            ledgers[which] = Ledger()
+        now = closed.copy()
+        for ledger in ledgers:
+            ledger.add_to(now)
+        total, parts = now.counts(), [closed.counts(), *(ledger.counts() for ledger in ledgers)]
+        for fate in ("received", "used", "replaced", "duplicate", "missing", "waiting"):
+            assert getattr(total, fate) == sum(getattr(counts, fate) for counts in parts)
+        for fate in ("received", "used", "replaced", "duplicate"):
+            assert getattr(total, fate) >= getattr(before, fate)
+        assert all(total.dropped[code] >= count for code, count in before.dropped.items())
+        assert balanced(total)
+        assert closed.waiting == 0
+        before = total
 
 
-@given(accounts)
-def test_closed_accounts_wait_for_nothing_and_balance_as_before(counts: Counts) -> None:
-    closed = counts.closed()
-    assert closed.waiting == 0
-    assert balanced(closed) == balanced(counts)
-    assert closed.closed() == closed
+def enter(ledger: Ledger, step: str, number: int) -> None:
+    message = ("b", number)
+    match step:
+        case "announce":
+            ledger.hear([message], message)
+        case "unreadable":
+            ledger.drop("bad", 1, counted=True)
+        case "broken":
+            ledger.drop("malformed", number, counted=False)
+        case "close":
+            ledger.close()
+        case _ if ledger.take(message) and step == "settle":
+            ledger.settle(message, "used")
+        case "reject" if message in ledger._open:
+            ledger.reject(message, "bad")
+
+
+def test_of_a_closed_ledger_nothing_waits() -> None:
+    ledger = Ledger()
+    ledger.hear([("b", 0), ("b", 2)], ("b", 2))
+    ledger.close()
+    assert ledger.counts() == Counts(received=2, replaced=1, missing=1, dropped={FORGOTTEN: 1})

@@ -161,8 +161,8 @@ def test_a_forgotten_robot_leaves_its_accounts_behind() -> None:
         scene.wait(2)
         assert "r1" not in scene.snapshot.robots
     # Of the second life the first message is missing, as of any robot that sent before the station heard of it.
-    assert scene.snapshot.forgotten["keyframe"] == Counts(received=2, used=2, missing=1)
-    assert scene.snapshot.forgotten["pose"] == Counts(received=2, used=2, missing=1)
+    assert scene.station.census().accounts["keyframe"] == Counts(received=2, used=2, missing=1)
+    assert scene.station.census().accounts["pose"] == Counts(received=2, used=2, missing=1)
 
 
 def test_a_picture_whose_robot_is_forgotten_meanwhile_is_dropped() -> None:
@@ -171,4 +171,4 @@ def test_a_picture_whose_robot_is_forgotten_meanwhile_is_dropped() -> None:
     assert isinstance(job, ExtractFeatures)
     scene.wait(4)
     scene.receive(FeaturesExtracted(job.keyframe.id, FEATURES))
-    assert scene.snapshot.forgotten["keyframe"] == Counts(received=1, dropped={FORGOTTEN: 1})
+    assert scene.station.census().accounts["keyframe"] == Counts(received=1, dropped={FORGOTTEN: 1})
