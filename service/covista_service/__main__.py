@@ -75,7 +75,7 @@ def serve(
         settings = load({name: value for name, value in flags.items() if value is not None}, config)
     except SettingsError as error:
         _refuse(str(error), EXIT_SETTINGS)
-    log_to_stderr(settings.log_level)
+    log_to_stderr(settings.log_level, settings.log_format, settings.log_lines_per_minute)
 
     def tell(running: Running) -> None:
         print(f"API {running.url}/api/v1, docs {running.url}/docs, zenoh {', '.join(running.link)}", flush=True)

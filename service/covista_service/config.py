@@ -98,6 +98,10 @@ class Settings(LiveSettings, BaseSettings):
     workers_count: int = Field(default=2, ge=1, le=256, description="How many surveys run at a time.")
     insecure: bool = Field(default=False, description="Listen beyond loopback without access control.")
     log_level: Literal["debug", "info", "warning", "error"] = Field(default="info", description="Least level to log.")
+    log_format: Literal["text", "json"] = Field(default="text", description="A line of words, or a JSON object.")
+    log_lines_per_minute: int = Field(
+        default=60, ge=0, le=1_000_000, description="Lines of one kind a minute; 0 for no limit."
+    )
     live_after_s: Seconds = Field(default=5, description="A robot is live so long after its last message.")
     gone_after_s: Seconds = Field(default=30, description="A stale robot is gone after so much more silence.")
     forget_after_s: Seconds = Field(default=600, description="A robot is forgotten after this silence.")
@@ -109,6 +113,15 @@ class Settings(LiveSettings, BaseSettings):
     def api_address(self) -> Address:
         """Where the REST interface listens."""
         return parse_address(self.api)
+
+    @property
+    def shown(self) -> dict[str, str]:
+        """All settings as words that may stand in a log: without passwords."""
+        shown = {name: str(getattr(self, name)) for name in type(self).model_fields}
+        # What is asked of a database, or configures an end point, may hold a key.
+        shown["database"] = make_url(self.database).set(query={}).render_as_string(hide_password=True)
+        shown |= {name: ", ".join(each.split("#")[0] for each in getattr(self, name)) for name in ("link", "connect")}
+        return shown
 
     @property
     def live(self) -> LiveSettings:

@@ -9,6 +9,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
@@ -19,6 +20,7 @@ from covista_service.answers import event_report
 from covista_service.perception.camera import Features
 from covista_service.perception.comparison import Comparison
 from covista_service.perception.scene import Evidence, Settled
+from covista_service.station.census import Census
 from covista_service.station.events import (
     BuildSurfaces,
     Effect,
@@ -29,24 +31,29 @@ from covista_service.station.events import (
     GroupsEvaluated,
     Happened,
     Keyframe,
+    KeyframeArrived,
     MessageDropped,
     MessagesReceived,
+    PoseArrived,
     SurfacesBuilt,
     SurveyDone,
     SurveyPair,
     Tick,
+    TokenLost,
+    TokenSeen,
 )
 from covista_service.station.snapshot import Snapshot
 from covista_service.station.station import Station
-from covista_service.telemetry import Telemetry
+from covista_service.telemetry import WORKER_FAILED, JobKind, Telemetry, about
+from covista_service.telemetry.journal import note_effect, note_event
 
 TICK_S = 0.25
 # While news of keyframes waits to be evaluated.
 SOON_S = 0.02
 # Mail of so many robots is opened before workers' results and other tasks get their turn.
 BATCH = 32
-WORKER_FAILED = "worker_failed"
 _NS_PER_S = 1e9
+_UNTIMED = nullcontext()
 _T = TypeVar("_T")
 # Features of an image and its thumbnail as JPEG; settled keyframes and the evidence with depths.
 Extraction = tuple[Features, bytes | None]
@@ -107,6 +114,15 @@ class News:
     robots: tuple[str, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class SinkStatus:
+    """How a sink is doing: entries that wait, and those that were told or lost since the start."""
+
+    waiting: int
+    told: int
+    lost: int
+
+
 class Sink(Protocol):
     """Who tells the world; returns at once."""
 
@@ -152,7 +168,9 @@ class Loop:
                 pass
             self._awake.clear()
             try:
-                if self.turn():
+                with self._telemetry.timed("turn"):
+                    more = self.turn()
+                if more:
                     self._awake.set()
             except Exception:
                 # The swarm is better served by a station that lost one batch than by none.
@@ -183,6 +201,10 @@ class Loop:
         """The station as it is; only in the loop's own thread."""
         return self._station.snapshot(self._clock())
 
+    def census(self) -> Census:
+        """The station in numbers; only in the loop's own thread."""
+        return self._station.census()
+
     def ask(self, timeout_s: float = 1.0) -> Snapshot:
         """The station as it is, for other threads. Raises TimeoutError, also when the loop is not running."""
         answer: Future[Snapshot] = Future()
@@ -203,56 +225,74 @@ class Loop:
         return (self._clock() - self._turned_ns) / _NS_PER_S
 
     def _receive(self, event: Event) -> Sequence[Effect]:
+        self._count(event)
+        note_event(event)
+        try:
+            with self._timed(event):
+                effects = self._station.receive(event, self._clock())
+        except Exception:
+            # A bug that one robot's message brings to light must not silence the swarm.
+            self._telemetry.fault("station")
+            log.exception(
+                "the station failed; going on", extra=about(event=type(event).__name__, robot=_robot_of(event))
+            )
+            return ()
+        for effect in effects:
+            note_effect(effect)
+            self._act(effect)
+        return effects
+
+    def _count(self, event: Event) -> None:
         match event:
             case MessagesReceived():
                 self._telemetry.received(event.topic, len(event.sequences))
             case MessageDropped(counted=False):
                 self._telemetry.received(event.topic, event.count)
             case FeaturesExtracted():
-                self._telemetry.ended()
+                self._telemetry.ended("extract")
             case SurveyDone():
-                self._telemetry.ended()
+                self._telemetry.ended("compare")
                 self._telemetry.surveyed(event.found.outcome if event.found else WORKER_FAILED)
             case SurfacesBuilt():
-                self._telemetry.ended()
-        try:
-            effects = self._station.receive(event, self._clock())
-        except Exception:
-            # A bug that one robot's message brings to light must not silence the swarm.
-            self._telemetry.fault("station")
-            log.exception("the station failed on %s; going on", type(event).__name__)
-            return ()
-        for effect in effects:
-            self._act(effect)
-        return effects
+                self._telemetry.ended("build")
+
+    def _timed(self, event: Event) -> AbstractContextManager[None]:
+        match event:
+            case Tick():
+                return self._telemetry.timed("regroup")
+            case SurfacesBuilt():
+                return self._telemetry.timed("reading")
+        return _UNTIMED
 
     def _act(self, effect: Effect) -> None:
         match effect:
             case ExtractFeatures(keyframe):
-                self._start(lambda: self._crew.extract(keyframe), lambda done: _extracted(keyframe, done))
+                self._start("extract", lambda: self._crew.extract(keyframe), lambda done: _extracted(keyframe, done))
             case SurveyPair():
-                self._start(lambda: self._crew.survey(effect), lambda done: _surveyed(effect, done))
+                self._start("compare", lambda: self._crew.survey(effect), lambda done: _surveyed(effect, done))
             case BuildSurfaces():
-                self._start(lambda: self._crew.build(effect), lambda done: _built(effect, done))
+                self._start("build", lambda: self._crew.build(effect), lambda done: _built(effect, done))
             case GroupsEvaluated(keyframes):
                 now_ns = self._clock()
                 for _, arrived_ns in keyframes:
                     self._telemetry.grouped((now_ns - arrived_ns) / _NS_PER_S)
 
-    def _start(self, submit: Callable[[], Future[_T]], event_of: Callable[[Future[_T]], Event]) -> None:
-        self._telemetry.started()
+    def _start(self, kind: JobKind, submit: Callable[[], Future[_T]], event_of: Callable[[Future[_T]], Event]) -> None:
+        self._telemetry.started(kind)
+        begun_s = self._telemetry.timer()
         try:
             job = submit()
         except Exception as error:
             # A job that cannot even be handed over has failed like any other: the station must have it back.
-            log.exception("a job could not be handed over")
+            log.exception("a job could not be handed over", extra=about(kind=kind))
             job = Future()
             job.set_exception(error)
-        job.add_done_callback(lambda done: self._finish(done, event_of))
+        job.add_done_callback(lambda done: self._finish(kind, begun_s, done, event_of))
 
-    def _finish(self, done: Future[_T], event_of: Callable[[Future[_T]], Event]) -> None:
+    def _finish(self, kind: JobKind, begun_s: float, done: Future[_T], event_of: Callable[[Future[_T]], Event]) -> None:
         """Runs in a worker's thread."""
         if not done.cancelled():
+            self._telemetry.worked(kind, self._telemetry.timer() - begun_s)
             self._results.append(event_of(done))
             self.wake()
 
@@ -275,23 +315,36 @@ def _extracted(keyframe: Keyframe, done: Future[Extraction]) -> FeaturesExtracte
         case DecodeError() as error:
             return FeaturesExtracted(keyframe.id, None, None, error.code, str(error))
         case failure:
-            return FeaturesExtracted(keyframe.id, None, None, WORKER_FAILED, _describe("extracting features", failure))
+            problem = _describe("extracting features", failure, robot=keyframe.id.robot)
+            return FeaturesExtracted(keyframe.id, None, None, WORKER_FAILED, problem)
 
 
 def _built(job: BuildSurfaces, done: Future[Built]) -> SurfacesBuilt:
     failure = done.exception()
     if failure is None:
         return SurfacesBuilt(job, *done.result())
-    return SurfacesBuilt(job, None, problem=_describe("building surfaces", failure))
+    robots = ", ".join(name.robot for name in job.keyframes)
+    return SurfacesBuilt(job, None, problem=_describe("building surfaces", failure, robots=robots))
 
 
 def _surveyed(job: SurveyPair, done: Future[Comparison]) -> SurveyDone:
     failure = done.exception()
     if failure is None:
         return SurveyDone(job.first, job.second, done.result())
-    return SurveyDone(job.first, job.second, None, _describe("surveying a pair", failure))
+    pair = f"{job.first.robot}/{job.second.robot}"
+    return SurveyDone(job.first, job.second, None, _describe("surveying a pair", failure, pair=pair))
 
 
-def _describe(what: str, failure: BaseException) -> str:
-    log.error("%s failed", what, exc_info=failure)
+def _describe(what: str, failure: BaseException, **whom: object) -> str:
+    log.error("a job failed", exc_info=failure, extra=about(job=what, **whom))
     return f"{what} failed: {type(failure).__name__}: {failure}"
+
+
+def _robot_of(event: Event) -> str | None:
+    """The robot whose message it is, if it is one's."""
+    match event:
+        case KeyframeArrived(keyframe):
+            return keyframe.id.robot
+        case MessagesReceived() | MessageDropped() | PoseArrived() | TokenSeen() | TokenLost():
+            return event.robot
+    return None

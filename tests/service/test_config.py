@@ -62,6 +62,8 @@ def test_the_environment_says_lists_and_choices_as_text(monkeypatch: pytest.Monk
         ("database", "covista.db", "sqlite:///covista.db"),
         ("database", "postgresql://host:port/covista", "not a database URL"),
         ("log_level", "loud", "'debug'"),
+        ("log_format", "xml", "'text' or 'json'"),
+        ("log_lines_per_minute", -1, "greater than or equal to 0"),
         ("live_after_s", 0, "greater than 0"),
     ],
 )
@@ -151,3 +153,18 @@ def test_what_is_wrong_with_a_part_names_the_part(
         load()
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_settings_are_shown_without_what_is_secret() -> None:
+    settings = load(
+        {
+            "database": "postgresql://station:secret@db:5432/covista?sslpassword=secret",
+            "connect": ["tls/router:7447#root_ca_certificate_base64=secret", "tcp/10.0.0.1:7447"],
+        }
+    )
+    shown = settings.shown
+    assert shown.keys() == type(settings).model_fields.keys()
+    assert "secret" not in str(shown)
+    assert shown["database"] == "postgresql://station:***@db:5432/covista"
+    assert shown["connect"] == "tls/router:7447, tcp/10.0.0.1:7447"
+    assert shown["alpha"] == "0.5"

@@ -9,10 +9,10 @@ from covista_schemas.errors import DecodeError
 from covista_schemas.reports import EventKind, FoundBy
 from covista_service.link.inbox import Inbox
 from covista_service.link.mailbox import Letter, Mailboxes
-from covista_service.loop import WORKER_FAILED, Loop, News
+from covista_service.loop import Loop, News
 from covista_service.station.events import Event, MessagesReceived, SurveyPair, TokenSeen
 from covista_service.station.station import Station
-from covista_service.telemetry import Telemetry
+from covista_service.telemetry import WORKER_FAILED, Telemetry
 
 from tests.service.deadline import DEADLINE_S
 from tests.service.hands import Hands
@@ -74,6 +74,23 @@ def test_keyframes_become_overlaps_groups_and_news() -> None:
     assert summary.outcomes == {"measured": 1}
 
 
+def sample(desk: Desk, name: str, **labels: str) -> float | None:
+    return desk.telemetry.registry.get_sample_value(name, labels)
+
+
+def test_jobs_and_stages_are_timed() -> None:
+    desk = Desk()
+    desk.put(picture_bytes("r1"), "r1")
+    desk.put(keyframe_bytes("r2", 1.0), "r2")
+    desk.put(keyframe_bytes("r3", 0.0), "r3")
+    desk.settle()
+    done = {kind: sample(desk, "covista_job_seconds_count", kind=kind) for kind in ("extract", "compare", "build")}
+    assert done["extract"] == 1
+    assert done["compare"] == desk.telemetry.summary().surveys > 0
+    assert done["build"] == sample(desk, "covista_reading_seconds_count")
+    assert sample(desk, "covista_regroup_seconds_count") == 10
+
+
 def test_latency_runs_from_arrival_to_the_groups_with_a_survey_of_it() -> None:
     desk = Desk()
     desk.put(keyframe_bytes("r1", 0.0), "r1")
@@ -126,13 +143,16 @@ def test_a_crew_that_cannot_take_a_job_gives_it_back(monkeypatch: pytest.MonkeyP
     assert desk.loop.snapshot().pair("r1", "r2").found_by is FoundBy.IMAGE
 
 
-def test_a_failed_survey_is_counted_and_survived() -> None:
+def test_a_failed_survey_is_counted_and_survived(caplog: pytest.LogCaptureFixture) -> None:
     desk = Desk()
     desk.hands.failure = ValueError("singular")
     desk.put(keyframe_bytes("r1", 0.0), "r1")
     desk.put(keyframe_bytes("r2", 1.0), "r2")
     desk.settle()
     assert desk.telemetry.summary().outcomes == {WORKER_FAILED: 1}
+    failed = [record.fields for record in caplog.records if record.levelname == "ERROR"]
+    assert {"job": "surveying a pair", "pair": "r1/r2"} in failed
+    assert all(each.keys() & {"pair", "robots"} for each in failed)
     assert desk.loop.snapshot().pair("r1", "r2").compared is None
 
 
@@ -153,13 +173,8 @@ def test_a_bug_that_one_event_brings_to_light_does_not_stop_the_others(
     desk.settle()
     assert desk.loop.snapshot().robots["r2"].poses.used == 1
     assert "ZeroDivisionError" in caplog.text
-    assert b"covista_faults_total" in exposition(desk.telemetry)
-
-
-def exposition(telemetry: Telemetry) -> bytes:
-    from prometheus_client import generate_latest
-
-    return generate_latest(telemetry.registry)
+    assert sample(desk, "covista_faults_total", where="station") == 1
+    assert {record.fields["robot"] for record in caplog.records} == {"r1"}
 
 
 def test_a_crowd_is_taken_in_by_batches() -> None:
@@ -194,10 +209,10 @@ async def until(look: Callable[[], bool]) -> None:
             await asyncio.sleep(0.005)
 
 
-def running(scenario: Callable[[Loop, Spring], Awaitable[None]]) -> Loop:
+def running(scenario: Callable[[Loop, Spring], Awaitable[None]], telemetry: Telemetry | None = None) -> Loop:
     """Run a scenario beside a running loop."""
     spring = Spring()
-    loop = Loop(Station(), spring, Hands(), [], Telemetry())
+    loop = Loop(Station(), spring, Hands(), [], telemetry or Telemetry())
 
     async def together() -> None:
         task = asyncio.create_task(loop.run())
@@ -208,6 +223,24 @@ def running(scenario: Callable[[Loop, Spring], Awaitable[None]]) -> Loop:
 
     asyncio.run(together())
     return loop
+
+
+def test_turns_are_timed() -> None:
+    telemetry = Telemetry()
+
+    def turns() -> float:
+        return telemetry.registry.get_sample_value("covista_turn_seconds_count") or 0.0
+
+    async def scenario(loop: Loop, spring: Spring) -> None:
+        await until(lambda: loop.running)
+        for turned in range(1, 4):
+            before = turns()
+            spring.waiting.append(TokenSeen(f"r{turned}", "b0"))
+            spring.wake()
+            await until(lambda seen=before: turns() > seen)
+
+    running(scenario, telemetry)
+    assert turns() >= 3
 
 
 def test_a_source_that_fails_once_is_asked_again(caplog: pytest.LogCaptureFixture) -> None:

@@ -14,7 +14,7 @@ from covista_service.demo.tidings import Failed, Ready
 
 def play(line: Line, settings: Settings) -> None:
     """Serve. Says `Ready` or `Failed`, answers every message with a `telemetry.Summary`, ends with its line."""
-    telemetry.log_to_stderr(settings.log_level)
+    telemetry.log_to_stderr(settings.log_level, settings.log_format, settings.log_lines_per_minute)
 
     def ready(running: serve.Running) -> None:
         line.send(Ready(running.url, running.link))

@@ -109,6 +109,12 @@ class Mailboxes:
         with self._lock:
             return dict(self._turned_away)
 
+    def depths(self) -> Depths:
+        """What waits now."""
+        with self._lock:
+            names = sum(len(box.names) for mail in self._mail.values() for box in mail.boxes.values())
+            return Depths(len(self._mail), names, self._bytes)
+
     def turn_away(self, reason: str) -> None:
         """Count a message that names no robot."""
         with self._lock:

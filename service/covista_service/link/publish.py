@@ -16,8 +16,9 @@ from covista_schemas.reports import EventReport
 from zenoh import ext
 
 from covista_service import answers
-from covista_service.loop import News
+from covista_service.loop import News, SinkStatus
 from covista_service.station.snapshot import Snapshot
+from covista_service.telemetry import about
 
 MAX_EVENTS = 1000
 
@@ -35,6 +36,8 @@ class Publisher:
         self._robots: dict[str, None] = {}
         self._snapshot: Snapshot | None = None
         self._closing = False
+        self._told = 0
+        self._lost = 0
         self._publishers: dict[str, ext.AdvancedPublisher] = {}
         self._thread = threading.Thread(target=self._run, name="covista-publish")
         self._thread.start()
@@ -42,11 +45,17 @@ class Publisher:
     def take(self, news: News) -> None:
         """Publish this soon."""
         with self._changed:
+            self._lost += max(0, len(self._events) + len(news.events) - MAX_EVENTS)
             self._events.extend(news.events)
             if news.groups_changed:
                 self._snapshot = news.snapshot
                 self._robots.update(dict.fromkeys(news.robots))
             self._changed.notify()
+
+    def status(self) -> SinkStatus:
+        """How many events and groups of robots wait, were put, and were lost because they could not be."""
+        with self._changed:
+            return SinkStatus(len(self._events) + len(self._robots), self._told, self._lost)
 
     def close(self) -> None:
         """Publish what is waiting, then end."""
@@ -76,7 +85,12 @@ class Publisher:
                 self._publish(snapshot, robots, events)
             except Exception:
                 # What cannot be published today must not keep tomorrow's groups from going out.
-                log.exception("cannot publish")
+                log.exception("cannot publish", extra=about(events=len(events), robots=len(robots)))
+                with self._changed:
+                    self._lost += len(events) + len(robots)
+            else:
+                with self._changed:
+                    self._told += len(events) + len(robots)
 
     def _publish(self, snapshot: Snapshot | None, robots: tuple[str, ...], events: tuple[EventReport, ...]) -> None:
         if snapshot is not None:

@@ -24,6 +24,7 @@ from covista_service.station.events import (
     TokenSeen,
     Topic,
 )
+from covista_service.telemetry import about
 
 FAULT = "station_fault"
 
@@ -72,7 +73,8 @@ def _open(letter: Letter) -> Event:
         return _drop(letter, error.code, str(error))
     except Exception:
         # A bug that one message brings to light costs that message, and stands in its robot's account.
-        log.exception("cannot open a %s of %s", letter.topic, letter.robot)
+        fields = about(robot=letter.robot, topic=letter.topic, boot=letter.boot, sequence=letter.sequence)
+        log.exception("cannot open a message", extra=fields)
         return _drop(letter, FAULT, "the station failed to read it")
 
 

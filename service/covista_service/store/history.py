@@ -11,10 +11,11 @@ from sqlalchemy import Engine
 from sqlalchemy.exc import SQLAlchemyError
 
 from covista_service import answers
-from covista_service.loop import News
+from covista_service.loop import News, SinkStatus
 from covista_service.store import tables
 from covista_service.store.database import file_is_gone, open_engine
 from covista_service.store.tables import Entry, LastNumbers
+from covista_service.telemetry import about
 
 QUEUE = 10_000
 BATCH = 500
@@ -46,6 +47,11 @@ class History:
     def dropped(self) -> int:
         """Entries that went because the queue was full."""
         return self._dropped
+
+    def status(self) -> SinkStatus:
+        """How many entries wait, were written, and were lost."""
+        with self._changed:
+            return SinkStatus(len(self._queue), self._written, self._dropped)
 
     def take(self, news: News) -> None:
         """Write this soon."""
@@ -99,7 +105,7 @@ class History:
             if self._write(batch):
                 pause_s = 0.0
             elif closing:
-                log.warning("%d entries of the history are lost", len(self._queue))
+                log.warning("the history ends without what waits", extra=about(lost=len(self._queue)))
                 return
             else:
                 pause_s = min(LONGEST_PAUSE_S, 2 * pause_s or self._first_pause_s)
@@ -120,6 +126,8 @@ class History:
             return False
         with self._changed:
             self._prepared = True
+            if self._problem is not None:
+                log.info("the history is written again", extra=about(waiting=len(self._queue), lost=self._dropped))
             self._problem = None
             self._written += len(batch)
         return True
@@ -135,6 +143,6 @@ class History:
         problem = f"the database cannot be used: {str(error).splitlines()[0]}"
         with self._changed:
             if self._problem is None:
-                log.warning("%s; going on without", problem)
+                log.warning("the history waits for its database", extra=about(waiting=len(self._queue), said=problem))
             self._problem = problem
             self._prepared = False

@@ -2,7 +2,7 @@ from threading import Thread
 
 import pytest
 from covista_service.link import mailbox
-from covista_service.link.mailbox import IDLE_NS, Letter, Mailboxes
+from covista_service.link.mailbox import IDLE_NS, Depths, Letter, Mailboxes
 from covista_service.station.events import Topic
 
 
@@ -161,3 +161,17 @@ def test_threads_lose_nothing() -> None:
         thread.join()
     counted += sum(len(mail.boxes["keyframe"].names) for mail in boxes.drain(10)[0])
     assert counted == 4 * 2000
+
+
+def test_depths_are_what_waits_and_nothing_when_it_is_taken() -> None:
+    boxes = Mailboxes()
+    assert boxes.depths() == Depths(0, 0, 0)
+    for sequence, size in enumerate((3, 10, 7)):
+        boxes.put(letter("r1", sequence, size=size))
+    boxes.put(letter("r1", 0, topic="pose", size=2))
+    boxes.put(letter("r2", 0, size=5))
+    assert boxes.depths() == Depths(robots=2, messages=5, payload_bytes=7 + 2 + 5)
+    boxes.drain(1)
+    assert boxes.depths() == Depths(1, 1, 5)
+    boxes.drain(1)
+    assert boxes.depths() == Depths(0, 0, 0)

@@ -1,3 +1,4 @@
+import threading
 from collections.abc import Iterator
 
 import pytest
@@ -5,12 +6,12 @@ import zenoh
 from covista_schemas import keys
 from covista_schemas.reports import EventReport, GroupsReport, OwnGroupReport
 from covista_service.answers import event_report
-from covista_service.link.publish import Publisher
-from covista_service.loop import News
+from covista_service.link.publish import MAX_EVENTS, Publisher
+from covista_service.loop import News, SinkStatus
 from covista_service.station.events import GroupsChanged, Happened
 from zenoh import ext
 
-from tests.service.deadline import wait_until
+from tests.service.deadline import DEADLINE_S, wait_until
 from tests.service.link.conftest import Air
 from tests.service.station.scenes import Scene
 
@@ -105,3 +106,41 @@ def test_closing_tells_what_is_waiting(air: Air) -> None:
         publisher.close()
         publisher.close()
         wait_until(lambda: heard)
+
+
+def test_what_was_told_is_counted(air: Air, publisher: Publisher) -> None:
+    news = news_of(two_robots())
+    publisher.take(news)
+    wait_until(lambda: publisher.status() == SinkStatus(0, len(news.events) + len(news.robots), 0))
+
+
+def test_what_cannot_be_told_is_counted(
+    air: Air, publisher: Publisher, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    news = news_of(two_robots())
+    with monkeypatch.context() as broken:
+        broken.setattr(publisher, "_put", lambda key, text: 1 / 0)
+        publisher.take(news)
+        wait_until(lambda: publisher.status().lost)
+    assert publisher.status() == SinkStatus(0, 0, len(news.events) + len(news.robots))
+    assert "ZeroDivisionError" in caplog.text
+
+
+def test_events_that_nobody_takes_up_are_lost_and_counted(
+    air: Air, publisher: Publisher, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    event = news_of(two_robots()).events[0]
+    entered, go_on = threading.Event(), threading.Event()
+
+    def slow(key: str, text: str) -> None:
+        entered.set()
+        assert go_on.wait(DEADLINE_S)
+
+    monkeypatch.setattr(publisher, "_put", slow)
+    publisher.take(News(Scene().snapshot, (event,), False, ()))
+    assert entered.wait(DEADLINE_S)
+    publisher.take(News(Scene().snapshot, (event,) * (MAX_EVENTS + 5), False, ()))
+    publisher.take(News(Scene().snapshot, (event,) * 2, False, ()))
+    assert publisher.status() == SinkStatus(waiting=MAX_EVENTS, told=0, lost=7)
+    go_on.set()
+    wait_until(lambda: publisher.status() == SinkStatus(0, 1 + MAX_EVENTS, 7))

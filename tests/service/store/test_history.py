@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from covista_schemas.reports import EventReport, GroupsReport
 from covista_service.answers import groups_report
-from covista_service.loop import News
+from covista_service.loop import News, SinkStatus
 from covista_service.store.database import DatabaseError, check_url
 from covista_service.store.history import History
 
@@ -77,7 +77,8 @@ def ready(history: History) -> Callable[[], bool]:
     return lambda: history.health().status == "ready"
 
 
-def test_a_path_that_cannot_be_opened_degrades_and_heals(tmp_path: Path) -> None:
+def test_a_path_that_cannot_be_opened_degrades_and_heals(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level("INFO", "covista_service.store.history")
     folder = tmp_path / "later"
     history = History(url(folder / "covista.db"), first_pause_s=QUICK_S)
     health = history.health()
@@ -90,6 +91,12 @@ def test_a_path_that_cannot_be_opened_degrades_and_heals(tmp_path: Path) -> None
     wait_until(ready(history), "the history is written again")
     history.close()
     assert rows(folder / "covista.db", "select count(*) from events") == [(len(news.events),)]
+    assert history.status() == SinkStatus(0, len(news.events) + 1, 0)
+    told = [(record.levelname, record.msg) for record in caplog.records]
+    assert told == [
+        ("WARNING", "the history waits for its database"),
+        ("INFO", "the history is written again"),
+    ]
 
 
 def test_a_file_that_was_removed_is_begun_anew(file: Path) -> None:
