@@ -14,6 +14,7 @@ from fastapi import FastAPI
 from covista_service.access import check_listening
 from covista_service.api import rest
 from covista_service.api.deps import Parts, State
+from covista_service.api.vitals import Vitals
 from covista_service.config import Settings
 from covista_service.grouping.hysteresis import HysteresisOptions
 from covista_service.grouping.warming import warm_up
@@ -23,12 +24,12 @@ from covista_service.link.mailbox import Mailboxes
 from covista_service.link.publish import Publisher
 from covista_service.link.queries import Queries
 from covista_service.link.session import open_session
-from covista_service.loop import Loop
+from covista_service.loop import CrewStatus, Loop
 from covista_service.station.options import GroupingOptions, StationOptions
 from covista_service.station.station import Station
 from covista_service.store.database import check_url
 from covista_service.store.history import History
-from covista_service.telemetry import Telemetry
+from covista_service.telemetry import Telemetry, about
 from covista_service.workers import Workers, WorkersOptions
 
 log = logging.getLogger(__name__)
@@ -87,7 +88,18 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
             moving |= {"store": history.health(), "loop": _loop_health(loop, task)}
             return _health({"link": link, **moving})
 
-        yield Parts(loop, telemetry, health_now, lambda: mailboxes.turned_away, secrets.token_hex(4))
+        def vitals_now() -> Vitals:
+            return Vitals(
+                mail=mailboxes.depths(),
+                crew=CrewStatus(settings.workers, workers.capacity, workers.warm),
+                sinks={"zenoh": publisher.status(), "history": history.status()},
+                turned_away=mailboxes.turned_away,
+                sessions=len(session.info.transports()),
+            )
+
+        log.info("starts", extra=about(**settings.shown))
+        yield Parts(loop, telemetry, health_now, vitals_now, secrets.token_hex(4))
+        log.info("stops", extra=about(surveys=telemetry.summary().surveys))
 
 
 async def _run(loop: Loop) -> None:

@@ -11,7 +11,9 @@ from covista_schemas.keys import ID_PATTERN
 from covista_schemas.reports import Health, Report
 from fastapi import Depends, Path, Request, Response
 
+from covista_service.api.vitals import Vitals
 from covista_service.loop import Loop
+from covista_service.station.census import Census
 from covista_service.station.snapshot import Snapshot
 from covista_service.telemetry import Telemetry
 
@@ -25,7 +27,7 @@ class Parts:
     loop: Loop
     telemetry: Telemetry
     health: Callable[[], Health]
-    turned_away: Callable[[], dict[str, int]]
+    vitals: Callable[[], Vitals]
     name: str
 
 
@@ -49,6 +51,12 @@ async def snapshot_of(parts: PartsNow) -> Snapshot:
     return parts.loop.snapshot()
 
 
+async def census_of(parts: PartsNow) -> Census:
+    """The station now in numbers; asynchronous as above."""
+    return parts.loop.census()
+
+
+CensusNow = Annotated[Census, Depends(census_of)]
 SnapshotNow = Annotated[Snapshot, Depends(snapshot_of)]
 RobotPath = Annotated[str, Path(pattern=f"^{ID_PATTERN}$", description="Id of a robot.", examples=["r1"])]
 

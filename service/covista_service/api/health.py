@@ -7,7 +7,7 @@ from fastapi import APIRouter, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 
 from covista_service.api import examples
-from covista_service.api.deps import PartsNow, SnapshotNow, answer
+from covista_service.api.deps import CensusNow, PartsNow, answer
 from covista_service.api.metrics import of_station
 
 router = APIRouter(tags=["health"])
@@ -26,7 +26,8 @@ async def health(parts: PartsNow) -> Response:
 
 
 @router.get("/metrics", response_class=Response, responses={200: {"content": {"text/plain": {}}}})
-def metrics(parts: PartsNow, snapshot: SnapshotNow) -> Response:
+def metrics(parts: PartsNow, census: CensusNow) -> Response:
     """Counts and latencies for Prometheus."""
-    text = generate_latest(parts.telemetry.registry) + generate_latest(of_station(snapshot, parts.turned_away()))
+    now = of_station(census, parts.vitals(), parts.health())
+    text = generate_latest(parts.telemetry.registry) + generate_latest(now)
     return Response(text, media_type=CONTENT_TYPE_LATEST)

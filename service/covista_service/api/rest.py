@@ -8,6 +8,7 @@ from fastapi import APIRouter, FastAPI
 from starlette.types import ASGIApp, Lifespan, Receive, Scope, Send
 
 from covista_service.api import contract, errors, groups, health, pairs, robots, similarity
+from covista_service.api.timing import PREFIX, timed
 
 
 def build(lifespan: Lifespan[FastAPI] | None = None) -> FastAPI:
@@ -19,12 +20,13 @@ def build(lifespan: Lifespan[FastAPI] | None = None) -> FastAPI:
         lifespan=lifespan,
         redoc_url=None,
     )
-    nouns = APIRouter(prefix="/api/v1", responses=errors.describe(422, 500))
+    nouns = APIRouter(prefix=PREFIX, responses=errors.describe(422, 500))
     for router in (robots.router, pairs.router, similarity.router, groups.router):
         nouns.include_router(router)
     app.include_router(nouns)
     app.include_router(health.router)
     errors.install(app)
+    app.add_middleware(timed)
     app.add_middleware(_head_as_get)
     # FastAPI's way to replace its own description is to assign the method.
     setattr(app, "openapi", contract.describe(app))  # noqa: B010 - mypy refuses the plain assignment

@@ -8,7 +8,9 @@ import pytest
 from covista_schemas.reports import Health, PartHealth
 from covista_service.api import rest
 from covista_service.api.deps import Parts
-from covista_service.loop import Loop
+from covista_service.api.vitals import Vitals
+from covista_service.link.mailbox import Depths
+from covista_service.loop import CrewStatus, Loop, SinkStatus
 from covista_service.station.events import Event
 from covista_service.telemetry import Telemetry
 
@@ -31,12 +33,22 @@ class Desk:
     """The REST interface of a scene's station, without a network."""
 
     scene: Scene = field(default_factory=Scene)
+    vitals: Vitals = field(
+        default_factory=lambda: Vitals(
+            mail=Depths(robots=3, messages=4, payload_bytes=5),
+            crew=CrewStatus("threads", 2, fallback="no scheduler", lost=1, retried=6),
+            sinks={"zenoh": SinkStatus(7, 8, 9), "history": SinkStatus(10, 11, 12)},
+            turned_away={"wrong_key": 2},
+            sessions=13,
+        )
+    )
     health: Health = field(default_factory=lambda: Health(status="ready", parts={"link": PartHealth(status="ready")}))
 
     def __post_init__(self) -> None:
         self.app = rest.build()
-        loop = Loop(self.scene.station, Silence(), Hands(), [], Telemetry(), clock=lambda: self.scene.now_ns)
-        self.parts = Parts(loop, Telemetry(), lambda: self.health, lambda: {"wrong_key": 2}, "test")
+        telemetry = Telemetry()
+        loop = Loop(self.scene.station, Silence(), Hands(), [], telemetry, clock=lambda: self.scene.now_ns)
+        self.parts = Parts(loop, telemetry, lambda: self.health, lambda: self.vitals, "test")
 
     async def _stateful(self, scope: dict[str, Any], receive: Any, send: Any) -> None:
         scope["state"] = {"parts": self.parts}
