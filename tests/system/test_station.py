@@ -17,6 +17,7 @@ from covista_schemas.reports import Counters, FoundBy, OwnGroupReport, RobotRepo
 from covista_schemas.zenoh_config import config
 from covista_service.serve import Running
 
+from tests.service.api.expositions import Key, values
 from tests.service.deadline import wait_until
 from tests.service.wall import (
     CAMERA,
@@ -271,3 +272,21 @@ def test_many_stations_do_not_share_a_thing(tmp_path: Path) -> None:
             wait_until(lambda: one.robots().robots)
             assert other.robots().robots == []
         air.close()
+
+
+def test_prometheus_is_told_what_rest_is_told(site: Site) -> None:
+    site.air.put(keys.pose("default", "counted"), pose_bytes("counted", 400.0))
+    site.settled("counted", 1, "poses")
+
+    def agreed() -> dict[Key, float] | None:
+        told = values(_metrics(site))
+        received = sum(robot.poses.received for robot in site.control.robots().robots)
+        return told if told["covista_messages_total", (("fate", "received"), ("topic", "pose"))] == received else None
+
+    told = wait_until(agreed, "the same accounts")
+    assert told["covista_link_sessions", ()] >= 1
+    assert told["covista_workers_capacity", (("kind", "threads"),)] == 2
+    assert {told["covista_part_ready", (("part", part),)] for part in ("link", "workers", "store", "loop")} == {1.0}
+    assert told["covista_turn_seconds_count", ()] > 0
+    assert told["covista_news_told_total", (("sink", "history"),)] > 0
+    assert told["covista_requests_total", (("route", "/robots"), ("status", "200"))] > 0
