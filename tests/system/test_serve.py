@@ -1,5 +1,6 @@
 """`covista-station serve` as a process: what stops it before it listens, and how it ends."""
 
+import json
 import os
 import re
 import signal
@@ -38,14 +39,14 @@ def refused(folder: Path, *flags: str, **variables: str) -> tuple[int, str]:
 
 
 @contextmanager
-def serving(folder: Path, *flags: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+def serving(folder: Path, *flags: str, **variables: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """A station's process and its URL."""
     listening = ["--api", "127.0.0.1:0", "--link", free_endpoint()]
     # Ctrl-C is ignored at first, as it is for what a script starts in the background.
     process = subprocess.Popen(
         ["/bin/sh", "-c", 'trap "" INT; exec "$@"', "sh", *COMMAND, *listening, *flags],
         cwd=folder,
-        env=environment(),
+        env=environment(**variables),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -79,6 +80,18 @@ def test_a_signal_ends_it_soon_with_0_and_nothing_left(tmp_path: Path, workers: 
         _, alive = psutil.wait_procs(family, timeout=5)
         assert not alive
     assert (tmp_path / "covista.db").exists()
+
+
+def test_its_log_is_json_where_asked_for_from_start_to_stop(tmp_path: Path) -> None:
+    with serving(tmp_path, COVISTA_LOG_FORMAT="json", COVISTA_SITE="mill") as (process, url):
+        wait_until(lambda: httpx.get(f"{url}/readyz").status_code == 200, "it is ready", 60)
+        process.send_signal(signal.SIGTERM)
+        _, log = process.communicate(timeout=10)
+    lines = [json.loads(line) for line in log.splitlines()]
+    assert all(line.keys() >= {"time", "level", "logger", "message"} for line in lines)
+    (start,) = [line for line in lines if line["message"] == "starts"]
+    assert (start["level"], start["site"], start["log_format"]) == ("info", "mill", "json")
+    assert lines[-1]["message"] == "stops"
 
 
 def test_a_taken_api_port_is_one_line_with_the_flag(tmp_path: Path) -> None:
