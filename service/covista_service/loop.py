@@ -9,7 +9,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
@@ -44,7 +44,7 @@ from covista_service.station.events import (
 )
 from covista_service.station.snapshot import Snapshot
 from covista_service.station.station import Station
-from covista_service.telemetry import WORKER_FAILED, JobKind, Telemetry, about
+from covista_service.telemetry import WORKER_FAILED, JobKind, Stage, Telemetry, about
 from covista_service.telemetry.journal import note_effect, note_event
 
 TICK_S = 0.25
@@ -53,6 +53,8 @@ SOON_S = 0.02
 # Mail of so many robots is opened before workers' results and other tasks get their turn.
 BATCH = 32
 _NS_PER_S = 1e9
+# What takes the station long enough to be timed.
+_STAGES: Mapping[type[Event], Stage] = {Tick: "regroup", SurfacesBuilt: "reading"}
 _UNTIMED = nullcontext()
 _T = TypeVar("_T")
 # Features of an image and its thumbnail as JPEG; settled keyframes and the evidence with depths.
@@ -226,9 +228,9 @@ class Loop:
 
     def _receive(self, event: Event) -> Sequence[Effect]:
         self._count(event)
-        note_event(event)
+        stage = _STAGES.get(type(event))
         try:
-            with self._timed(event):
+            with self._telemetry.timed(stage) if stage else _UNTIMED:
                 effects = self._station.receive(event, self._clock())
         except Exception:
             # A bug that one robot's message brings to light must not silence the swarm.
@@ -246,6 +248,10 @@ class Loop:
         match event:
             case MessagesReceived():
                 self._telemetry.received(event.topic, len(event.sequences))
+                return
+            case PoseArrived() | KeyframeArrived():
+                # Counted when they were announced.
+                return
             case MessageDropped(counted=False):
                 self._telemetry.received(event.topic, event.count)
             case FeaturesExtracted():
@@ -255,14 +261,7 @@ class Loop:
                 self._telemetry.surveyed(event.found.outcome if event.found else WORKER_FAILED)
             case SurfacesBuilt():
                 self._telemetry.ended("build")
-
-    def _timed(self, event: Event) -> AbstractContextManager[None]:
-        match event:
-            case Tick():
-                return self._telemetry.timed("regroup")
-            case SurfacesBuilt():
-                return self._telemetry.timed("reading")
-        return _UNTIMED
+        note_event(event)
 
     def _act(self, effect: Effect) -> None:
         match effect:
