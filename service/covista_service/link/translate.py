@@ -12,6 +12,7 @@ from covista_schemas.errors import DecodeError
 from covista_service.link.mailbox import Box, Letter, Mail
 from covista_service.link.pictures import check_image, check_thumbnail
 from covista_service.perception.camera import Camera, Features, Pose, rotation_of
+from covista_service.perception.extent import UNTOLD, Doubt
 from covista_service.station.events import (
     Event,
     Keyframe,
@@ -51,6 +52,11 @@ def camera_of(camera: messages.Camera) -> Camera:
 def pose_of(pose: messages.Pose) -> Pose:
     """The pose as the maths sees it."""
     return Pose(rotation_of(pose.orientation_xyzw), np.array(pose.position_m, np.float64))
+
+
+def doubt_of(pose: messages.Pose) -> Doubt:
+    """How far the pose may be off, by its covariance if there is one."""
+    return Doubt.of(np.array(pose.covariance).reshape(6, 6)) if pose.covariance else UNTOLD
 
 
 def features_of(features: messages.Features) -> Features:
@@ -98,6 +104,7 @@ def _keyframe(letter: Letter) -> KeyframeArrived:
             wire.image,
             None if wire.features is None else features_of(wire.features),
             wire.thumbnail,
+            doubt_of(wire.pose),
         )
     )
 

@@ -10,6 +10,7 @@ from covista_schemas.reports import EventKind
 
 from covista_service.perception.camera import Camera, Features, Pose, View
 from covista_service.perception.comparison import Comparison
+from covista_service.perception.extent import UNTOLD, Doubt
 from covista_service.perception.scene import Evidence, Settled, Sight
 
 Topic = Literal["keyframe", "pose"]
@@ -29,7 +30,7 @@ class KeyframeId:
 class Keyframe:
     """A keyframe inside the station; `features` is None until they are extracted from `image` (encoded bytes).
 
-    `thumbnail` is a small grey JPEG of it, if there is one.
+    `thumbnail` is a small grey JPEG of it, if there is one; `doubt` is how far the pose may be off.
     """
 
     id: KeyframeId
@@ -40,6 +41,7 @@ class Keyframe:
     image: bytes | None = None
     features: Features | None = None
     thumbnail: bytes | None = None
+    doubt: Doubt = UNTOLD
 
 
 # Events
