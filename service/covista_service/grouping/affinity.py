@@ -103,11 +103,11 @@ class Affinity:
         """Set a robot's position (3,) in metres; ValueError where it is not three finite numbers below 10^12."""
         self._put(self._slot[robot], _checked(robot, position_m))
 
-    def see(self, a: str, b: str, q_a: float | None, q_b: float | None, *, again: bool = False) -> None:
+    def see(self, a: str, b: str, q_a: float | None, q_b: float | None, *, again: bool = False) -> float | None:
         """Set the share `q_a` of a's image that b sees, and `q_b` of b's that a sees; None where unknown.
 
-        `again`: the same two pictures as before, read anew. They take the place of the last reading.
-        Raises ValueError for a robot and itself, and for a share that is none.
+        `again`: the same two pictures as before, read anew. They take the place of the last reading. What comes of it
+        is their mutual overlap, smoothed. Raises ValueError for a robot and itself, and for a share that is none.
         """
         i, j = self._slot[a], self._slot[b]
         if i == j:
@@ -127,6 +127,29 @@ class Affinity:
             mutual = min(max(held, 0.0), 1.0)
         self._once[i, j] = self._once[j, i] = fresh or (again and bool(self._once[i, j]))
         self._mutual[i, j] = self._mutual[j, i] = mutual
+        return None if math.isnan(mutual) else mutual
+
+    def see_row(self, robot: str, others: Sequence[str], q: Floats, *, again: bool = False) -> None:
+        """`see` for a robot and many others at once.
+
+        `q` (n, 2) are the shares of its image that each of them sees, and of theirs that it sees; NaN where unknown.
+        Raises ValueError as `see` does.
+        """
+        i, js = self._slot[robot], np.array([self._slot[other] for other in others], np.intp)
+        if (js == i).any():
+            raise ValueError(f"{robot} shares all of its view with itself")
+        if ((q < 0) | (q > 1)).any():
+            raise ValueError(f"a share lies from 0 to 1, those of {robot} do not")
+        former = (self._overlap[i, js] + self._overlap[js, i]) / 2
+        self._overlap[i, js], self._overlap[js, i] = q[:, 0], q[:, 1]
+        mutual, held, once = q.sum(axis=1) / 2, self._mutual[i, js], self._once[i, js]
+        fresh = np.isnan(held + mutual)
+        if self._smoothing != 1:
+            smooth = ~fresh & ~(once if again else False)
+            drawn = held + self._smoothing * (mutual - (former if again else held))
+            mutual = np.where(smooth, np.minimum(np.maximum(drawn, 0.0), 1.0), mutual)
+        self._once[i, js] = self._once[js, i] = fresh | (again & once)
+        self._mutual[i, js] = self._mutual[js, i] = mutual
 
     @property
     def squared_m2(self) -> Floats:
