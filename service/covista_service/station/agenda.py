@@ -2,87 +2,110 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Mapping
 from collections.abc import Set as AbstractSet
-from heapq import heappop, heappush
-from itertools import combinations
 
+from covista_service.perception.camera import Pose
+from covista_service.perception.extent import change
 from covista_service.station.events import Keyframe, KeyframeId, Pair
 from covista_service.station.options import StationOptions, nanoseconds
 from covista_service.station.pairs import Pairs, pair_of
-from covista_service.station.roster import Roster
+from covista_service.station.patrol import Patrol
+from covista_service.station.roster import Robot, Roster
+from covista_service.station.waiting import UNSEEN, Plan, Waiting
+from covista_service.station.workload import Workload
 
-_SWEEP_STEP = 64
 _SWEEP_EVERY = 8
 _MOTION_EVERY = 4
+_NOBODY: Mapping[str, Plan] = {}
+# How near a pair is to a boundary of groups, from 0 to 1.
+Boundary = Callable[[Pair], float]
 
 
 class Agenda:
     """Pairs in four queues, taken in turns so that none can starve another.
 
     *Fresh*: keyframes that no survey has seen yet, in order of arrival, each with its most promising partner.
-    *Regular*: pairs whose views may meet and that have a new keyframe, the one tried longest ago first.
+    *Regular*: pairs whose views may meet and that have a new keyframe, by expected news: see `Waiting`.
     *Moved*: a robot's new keyframe and an earlier one of its own, whose parallax tells depths.
-    *Sweep*: all other pairs with a new keyframe, a few at a time, each tried once in a while.
+    *Sweep*: all other pairs with a new keyframe, a few at a time, each tried once in a while: see `Patrol`.
+
+    What waits are pairs of robots, and their newest keyframes are surveyed: what is replaced meanwhile is counted as
+    outdated and never begun.
     """
 
-    def __init__(self, roster: Roster, pairs: Pairs, options: StationOptions) -> None:
+    def __init__(self, roster: Roster, pairs: Pairs, options: StationOptions, boundary: Boundary) -> None:
         self._roster = roster
         self._pairs = pairs
-        self._capacity = options.capacity
-        self._retry_after_ns = nanoseconds(options.retry_after_s)
+        self._boundary = boundary
+        self.capacity = options.capacity
         self._in_flight: dict[Pair, tuple[Keyframe, Keyframe]] = {}
-        self._partners: defaultdict[str, set[str]] = defaultdict(set)
-        self._tried_ns: dict[Pair, int] = {}
+        self._partners: dict[str, dict[str, Plan]] = {}
         self._fresh: dict[str, None] = {}
+        # Fresh ones whose pairs are all under way, or who have none: they wait for that to change.
+        self._parked: set[str] = set()
         self._moved: dict[str, Keyframe] = {}
-        self._regular: list[tuple[int, Pair]] = []
-        self._queued: set[Pair] = set()
-        self._sweep: Iterator[Pair] = iter(())
-        self._starts = 0
+        self._regular = Waiting()
+        self._patrol = Patrol(nanoseconds(options.retry_after_s))
+        self._started: Counter[str] = Counter()
+        self._outdated = 0
 
     def judge(self, pair: Pair, *, plausible: bool) -> None:
         """Enter whether a pair's views may meet, as of its newest keyframes."""
         a, b = pair
-        if plausible:
-            self._partners[a].add(b)
-            self._partners[b].add(a)
-            self._enqueue(pair)
-        else:
-            self._partners[a].discard(b)
-            self._partners[b].discard(a)
+        if not plausible:
+            self._part(pair)
+        elif b not in self._partners.get(a, _NOBODY):
+            plan = Plan(self._regular.turn)
+            self._partners.setdefault(a, {})[b] = self._partners.setdefault(b, {})[a] = plan
+        self.again(pair)
 
     def fresh(self, robot: str) -> None:
         """A robot has a keyframe that no survey has seen; one that waits already keeps its place."""
+        self._outdated += sum(pair_of(robot, other) in self._regular for other in self.partners(robot))
+        self._parked.discard(robot)
         self._fresh.setdefault(robot)
+        self._patrol.keyframe(robot)
 
     def moved(self, robot: str, earlier: Keyframe | None) -> None:
         """Hold a robot's new keyframe against an earlier one of its own; None if that would tell nothing."""
-        self._moved.pop(robot, None)
+        self._outdated += self._moved.pop(robot, None) is not None
         if earlier is not None:
             self._moved[robot] = earlier
 
     def partners(self, robot: str) -> AbstractSet[str]:
         """Robots whose views may meet this one's."""
-        return self._partners.get(robot, frozenset())
+        return self._partners.get(robot, _NOBODY).keys()
 
     @property
     def under_way_count(self) -> int:
         """How many surveys are under way."""
         return len(self._in_flight)
 
+    def workload(self) -> Workload:
+        """What waits, and what was started."""
+        waiting = {"fresh": len(self._fresh) + len(self._parked), "regular": len(self._regular)}
+        waiting["moved"] = len(self._moved)
+        return Workload(waiting, dict(self._started), len(self._in_flight), self._outdated)
+
     def start(self, now_ns: int) -> tuple[Keyframe, Keyframe] | None:
         """The next pair of keyframes to survey, under way from now on; None if nothing is due or all hands are full."""
-        if len(self._in_flight) >= self._capacity:
+        if len(self._in_flight) >= self.capacity:
             return None
-        queues = [self._next_fresh, self._next_regular]
-        if self._starts % 2:
+        starts = self._started.total()
+        queues: list[tuple[str, Callable[[], Pair | None]]]
+        queues = [("fresh", self._next_fresh), ("regular", self._next_regular)]
+        if starts % 2:
             queues.reverse()
-        queues.insert(0 if self._starts % _SWEEP_EVERY == _SWEEP_EVERY - 1 else 2, lambda: self._next_swept(now_ns))
-        queues.insert(0 if self._starts % _MOTION_EVERY == _MOTION_EVERY - 1 else 2, self._next_moved)
-        pair = next((found for queue in queues if (found := queue()) is not None), None)
-        return None if pair is None else self._start(pair, now_ns)
+        swept = lambda: self._patrol.next(now_ns, self.partners)  # noqa: E731 - a queue among others
+        queues.insert(0 if starts % _SWEEP_EVERY == _SWEEP_EVERY - 1 else 2, ("sweep", swept))
+        queues.insert(0 if starts % _MOTION_EVERY == _MOTION_EVERY - 1 else 2, ("moved", self._next_moved))
+        for name, queue in queues:
+            pair = queue()
+            if pair is not None:
+                return self._start(pair, name, now_ns)
+        return None
 
     def done(self, first: KeyframeId, second: KeyframeId) -> tuple[Keyframe, Keyframe] | None:
         """A survey is over; the keyframes it was about, None if it was not under way."""
@@ -94,8 +117,14 @@ class Agenda:
 
     def again(self, pair: Pair) -> None:
         """Put a pair back in the queue if one of its keyframes is newer than its last survey."""
-        if pair[1] in self.partners(pair[0]):
-            self._enqueue(pair)
+        plan = self._partners.get(pair[0], _NOBODY).get(pair[1])
+        if plan is None or not self._due(pair):
+            return
+        self._regular.put(pair, plan, self._news(pair, plan))
+        for robot in pair:
+            if robot in self._parked:
+                self._parked.remove(robot)
+                self._fresh[robot] = None
 
     def under_way(self, name: KeyframeId) -> bool:
         """Is a survey of this keyframe under way?"""
@@ -103,27 +132,40 @@ class Agenda:
 
     def forget(self, robot: str) -> None:
         """Take a robot off; what comes of its surveys under way is of no interest any more."""
-        for partner in self._partners.pop(robot, set()):
-            self._partners[partner].discard(robot)
+        for other in list(self.partners(robot)):
+            self._part(pair_of(robot, other))
         self._fresh.pop(robot, None)
+        self._parked.discard(robot)
         self._moved.pop(robot, None)
-        for pair in [pair for pair in self._tried_ns if robot in pair]:
-            del self._tried_ns[pair]
+        self._patrol.forget(robot)
         for pair in [pair for pair in self._in_flight if robot in pair]:
             del self._in_flight[pair]
 
-    def _start(self, pair: Pair, now_ns: int) -> tuple[Keyframe, Keyframe]:
+    def _part(self, pair: Pair) -> None:
+        self._regular.drop(pair)
+        for robot, other in (pair, pair[::-1]):
+            beside = self._partners.get(robot)
+            if beside is not None:
+                beside.pop(other, None)
+                if not beside:
+                    del self._partners[robot]
+
+    def _start(self, pair: Pair, queue: str, now_ns: int) -> tuple[Keyframe, Keyframe]:
         keyframes = self._keyframes(pair)
         # Every queue offers pairs that are due, and those have both keyframes.
         assert keyframes is not None  # noqa: S101 - tells the type checker what `_due` has found
         self._in_flight[pair] = keyframes
-        self._starts += 1
+        self._started[queue] += 1
         if pair[0] == pair[1]:
             del self._moved[pair[0]]
             return keyframes
-        self._tried_ns[pair] = now_ns
+        self._patrol.tried(pair, now_ns, budgeted=queue == "sweep")
+        plan = self._partners.get(pair[0], _NOBODY).get(pair[1])
+        if plan is not None:
+            self._regular.served(pair, plan, (keyframes[0].pose, keyframes[1].pose))
         for robot in pair:
             self._fresh.pop(robot, None)
+            self._parked.discard(robot)
         return keyframes
 
     def _keyframes(self, pair: Pair) -> tuple[Keyframe, Keyframe] | None:
@@ -141,45 +183,40 @@ class Agenda:
             return False
         return self._pairs[pair].surveyed != (keyframes[0].id, keyframes[1].id)
 
-    def _enqueue(self, pair: Pair) -> None:
-        if pair not in self._queued and self._due(pair):
-            self._queued.add(pair)
-            heappush(self._regular, (self._tried_ns.get(pair, 0), pair))
+    def _news(self, pair: Pair, plan: Plan) -> float:
+        """What a survey is expected to tell: how much both views have changed since, and whether groups turn on it."""
+        if plan.poses is None:
+            return UNSEEN
+        robots = (self._roster[pair[0]], self._roster[pair[1]])
+        moved = sum(_change(robot, pose) for robot, pose in zip(robots, plan.poses, strict=True))
+        return moved + self._boundary(pair)
 
     def _next_fresh(self) -> Pair | None:
-        for robot in list(self._fresh):
+        while self._fresh:
+            robot = next(iter(self._fresh))
             due = [pair for pair in (pair_of(robot, other) for other in self.partners(robot)) if self._due(pair)]
             if due:
                 return min(due, key=self._promise)
-            if not self.partners(robot):
-                del self._fresh[robot]
+            del self._fresh[robot]
+            self._parked.add(robot)
         return None
 
     def _next_moved(self) -> Pair | None:
         return next(((robot, robot) for robot in self._moved if (robot, robot) not in self._in_flight), None)
 
-    def _promise(self, pair: Pair) -> tuple[float, int, Pair]:
+    def _promise(self, pair: Pair) -> tuple[float, float, Pair]:
         overlaps = self._pairs.overlaps(pair)
-        return -sum(overlaps or (0.0,)), self._tried_ns.get(pair, 0), pair
+        return -sum(overlaps or (0.0,)), self._partners[pair[0]][pair[1]].turn, pair
 
     def _next_regular(self) -> Pair | None:
-        while self._regular:
-            tried_ns, pair = heappop(self._regular)
-            self._queued.discard(pair)
-            if tried_ns != self._tried_ns.get(pair, 0):
-                # Another queue has given it a turn meanwhile.
-                self._enqueue(pair)
-            elif pair[1] in self.partners(pair[0]) and self._due(pair):
+        while (pair := self._regular.take()) is not None:
+            if self._due(pair):
                 return pair
         return None
 
-    def _next_swept(self, now_ns: int) -> Pair | None:
-        for _ in range(_SWEEP_STEP):
-            pair = next(self._sweep, None)
-            if pair is None:
-                names = sorted(robot.id for robot in self._roster if robot.keyframe is not None)
-                self._sweep = combinations(names, 2)
-                return None
-            if now_ns - self._tried_ns.get(pair, -self._retry_after_ns) >= self._retry_after_ns and self._due(pair):
-                return pair
-        return None
+
+def _change(robot: Robot, pose: Pose) -> float:
+    """How much of a robot's view is another since it was at this pose."""
+    keyframe, depth = robot.keyframe, robot.depth
+    depth_m = None if depth is None else depth.median_m
+    return 0.0 if keyframe is None else change(keyframe.camera, pose, keyframe.pose, depth_m)

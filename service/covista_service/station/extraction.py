@@ -6,14 +6,14 @@ from covista_service.station.events import Keyframe, KeyframeId
 
 
 class Extractions:
-    """Takes robots in turns, at most `capacity` under way.
+    """Takes robots in turns, at most `capacity` under way; that may change.
 
     What is under way is finished and used even if a newer keyframe waits: a robot that sends faster than workers
     extract would otherwise never be seen at all.
     """
 
     def __init__(self, capacity: int) -> None:
-        self._capacity = capacity
+        self.capacity = capacity
         self._waiting: dict[str, Keyframe] = {}
         self._under_way: dict[str, Keyframe] = {}
 
@@ -36,7 +36,7 @@ class Extractions:
         """Keyframes to extract now, under way from now on."""
         started: list[Keyframe] = []
         for robot in [robot for robot in self._waiting if robot not in self._under_way]:
-            if len(self._under_way) >= self._capacity:
+            if len(self._under_way) >= self.capacity:
                 break
             self._under_way[robot] = self._waiting.pop(robot)
             started.append(self._under_way[robot])

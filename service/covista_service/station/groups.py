@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -34,6 +35,8 @@ class Groups:
         self._apart_ns = nanoseconds(min(options.regroup_after_s, _APART_S))
         self._members: dict[str, Members] = {}
         self._label_of: dict[str, str] = {}
+        # Rows of the similarity that was evaluated last.
+        self._rows: dict[str, int] = {}
         self._next_label = 1
         # Changes that settings propose and that are not shown yet.
         self._pending: tuple[Pending, ...] = ()
@@ -72,14 +75,33 @@ class Groups:
             self._affinity.remove(robot)
             self._news = True
 
-    def see(self, pair: Pair, overlaps: tuple[float, float] | None, *, again: bool = False) -> None:
-        """Set a pair's overlaps, None where unknown; nothing happens while one of the two takes no part.
+    def see(self, pair: Pair, overlaps: tuple[float, float] | None, *, again: bool = False) -> float | None:
+        """Set a pair's overlaps, None where unknown; what they have in common since, smoothed.
 
-        `again`: read anew from the same keyframes.
+        Nothing happens while one of the two takes no part. `again`: read anew from the same keyframes.
         """
-        if pair[0] in self._affinity and pair[1] in self._affinity:
-            self._affinity.see(*pair, *(overlaps or (None, None)), again=again)
+        if pair[0] not in self._affinity or pair[1] not in self._affinity:
+            return None
+        self._drift = True
+        return self._affinity.see(*pair, *(overlaps or (None, None)), again=again)
+
+    def see_row(self, robot: str, others: Iterable[str], overlap: float | None) -> None:
+        """Set the overlaps of a robot and many others to one number, those that take part."""
+        known = [other for other in others if other in self._affinity]
+        if robot in self._affinity and known:
+            self._affinity.see_row(robot, known, np.full((len(known), 2), np.nan if overlap is None else overlap))
             self._drift = True
+
+    def boundary(self, pair: Pair) -> float:
+        """How near a pair is to the boundary of a group, from 0 to 1, as last evaluated.
+
+        It is how alike two of different groups are, and how unlike two of the same.
+        """
+        first, second = (self._rows.get(robot) for robot in pair)
+        if first is None or second is None:
+            return 0.0
+        alike = self.similarity.similarity.item(first, second)
+        return 1.0 - alike if self._label_of.get(pair[0]) == self._label_of.get(pair[1]) else alike
 
     def set_options(self, options: GroupingOptions) -> None:
         """Group by other settings from the next evaluation on."""
@@ -139,6 +161,7 @@ class Groups:
         S = affinity.similarity(options.alpha, sigma_m)
         matrices = (_frozen(matrix) for matrix in (S, affinity.overlap, affinity.squared_m2))
         self.similarity = SimilarityView(self.similarity.revision + 1, affinity.robots, sigma_m, *matrices)
+        self._rows = {robot: row for row, robot in enumerate(self.similarity.robots)}
         proposal = propose(affinity, S, sigma_m, options, None if self._set_anew else self._shown())
         self.view = replace(self.view, scores=proposal.scores, note=proposal.note)
         standing = self._weigh(proposal, now_ns)

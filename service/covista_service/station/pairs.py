@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from heapq import heappop, heappush
 
 from covista_schemas.reports import FoundBy
 
@@ -74,27 +75,59 @@ def pair_of(a: str, b: str) -> Pair:
 
 
 class Pairs:
-    """Records by pair, and the order in which their answers grow too old."""
+    """Records of the pairs whose views may meet, and the order in which their answers grow too old.
+
+    All others share nothing, and are so many that nothing is kept of them: see `apart`.
+    """
 
     def __init__(self, unknown_after_ns: int) -> None:
         self._unknown_after_ns = unknown_after_ns
         self._records: dict[Pair, PairRecord] = {}
-        # Pairs with an answer, the oldest first: answers come in order of time.
-        self._by_age: dict[Pair, int] = {}
+        self._beside: dict[str, dict[str, None]] = {}
+        # When an answer may be too old, at the earliest, the next one first: one entry a pair.
+        self._ageing: list[tuple[int, Pair]] = []
+        self._timed: set[Pair] = set()
+        self._copy: Mapping[Pair, PairRecord] | None = None
 
     def __getitem__(self, pair: Pair) -> PairRecord:
         return self._records.get(pair, _NOTHING)
+
+    def __contains__(self, pair: object) -> bool:
+        return pair in self._records
+
+    def beside(self, robot: str) -> list[str]:
+        """Robots that there is a record with."""
+        return list(self._beside.get(robot, ()))
 
     def overlaps(self, pair: Pair) -> tuple[float, float] | None:
         """Overlaps in force, the smaller id's first; None where unknown."""
         answer = self[pair].answer
         return None if answer is None else answer.overlaps
 
+    def meet(self, pair: Pair, answer: Answer | None) -> None:
+        """Keep a record of a pair from now on; `answer` is what stands for it until then."""
+        if pair not in self._records:
+            self._put(pair, PairRecord())
+            if answer is not None:
+                self.enter(pair, answer)
+
+    def part(self, pair: Pair) -> PairRecord:
+        """Keep no record of a pair any longer; the one that was kept."""
+        record = self._records.pop(pair, None)
+        if record is None:
+            return _NOTHING
+        self._copy = None
+        for robot, other in (pair, pair[::-1]):
+            del self._beside[robot][other]
+            if not self._beside[robot]:
+                del self._beside[robot]
+        return record
+
     def surveyed(self, first: Keyframe, second: Keyframe, compared: Comparison | None) -> None:
         """Enter what a survey came to, None if it failed; the answer stands until surfaces are built with it."""
         pair = (first.id.robot, second.id.robot)
         outcome = FAILED if compared is None else str(compared.outcome)
-        self._records[pair] = replace(self[pair], compared=compared, outcome=outcome, surveyed=(first.id, second.id))
+        self._put(pair, replace(self[pair], compared=compared, outcome=outcome, surveyed=(first.id, second.id)))
 
     def enter(self, pair: Pair, answer: Answer) -> bool:
         """Enter the overlap as read from what is known now; True if the last one was read from the same keyframes.
@@ -106,36 +139,68 @@ class Pairs:
         if record.expired is not None and _same(record.expired, answer):
             return again
         if record.answer is not None and _same(record.answer, answer):
-            self._records[pair] = replace(record, answer=replace(answer, computed_ns=record.answer.computed_ns))
+            self._put(pair, replace(record, answer=replace(answer, computed_ns=record.answer.computed_ns)))
             return again
-        self._records[pair] = replace(record, answer=answer, expired=None)
-        self._by_age.pop(pair, None)
-        self._by_age[pair] = answer.computed_ns
+        self._put(pair, replace(record, answer=answer, expired=None))
+        self._time(pair, answer)
         return again
 
     def expire(self, now_ns: int) -> list[Pair]:
         """Drop the answers that have become too old to stand for anything; the pairs that are unknown now."""
         expired: list[Pair] = []
-        for pair, computed_ns in self._by_age.items():
-            if now_ns - computed_ns < self._unknown_after_ns:
-                break
+        while self._ageing and now_ns - self._ageing[0][0] >= self._unknown_after_ns:
+            _, pair = heappop(self._ageing)
+            self._timed.discard(pair)
+            record = self[pair]
+            if record.answer is None:
+                continue
+            if now_ns - record.answer.computed_ns < self._unknown_after_ns:
+                # It has been answered anew since.
+                self._time(pair, record.answer)
+                continue
+            old = replace(record.answer, outlooks=None)
+            self._put(pair, replace(record, answer=None, compared=None, expired=old))
             expired.append(pair)
-        for pair in expired:
-            del self._by_age[pair]
-            record = self._records[pair]
-            old = None if record.answer is None else replace(record.answer, outlooks=None)
-            self._records[pair] = replace(record, answer=None, compared=None, expired=old)
         return expired
 
     def forget(self, robot: str) -> None:
         """Drop every pair of a robot."""
-        for pair in [pair for pair in self._records if robot in pair]:
-            del self._records[pair]
-            self._by_age.pop(pair, None)
+        for other in self.beside(robot):
+            self.part(pair_of(robot, other))
 
     def records(self) -> Mapping[Pair, PairRecord]:
         """All records now, as a copy."""
-        return dict(self._records)
+        if self._copy is None:
+            self._copy = dict(self._records)
+        return self._copy
+
+    def _put(self, pair: Pair, record: PairRecord) -> None:
+        self._records[pair] = record
+        self._copy = None
+        for robot, other in (pair, pair[::-1]):
+            self._beside.setdefault(robot, {})[other] = None
+
+    def _time(self, pair: Pair, answer: Answer) -> None:
+        if pair not in self._timed:
+            self._timed.add(pair)
+            heappush(self._ageing, (answer.computed_ns, pair))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Judged:
+    """The keyframe by which it was judged whom a robot's view may meet, and when that was done first."""
+
+    keyframe: Keyframe
+    first_ns: int
+
+
+def apart(first: Judged, second: Judged) -> Answer:
+    """The answer about two robots, the smaller id first, whose views cannot meet: they share nothing.
+
+    It is as old as the younger of the two judgements.
+    """
+    computed_ns = max(first.first_ns, second.first_ns)
+    return Answer((0.0, 0.0), FoundBy.PREDICTED, computed_ns, first.keyframe, second.keyframe)
 
     def __len__(self) -> int:
         return len(self._records)

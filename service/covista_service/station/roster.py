@@ -12,7 +12,7 @@ from covista_service.perception.camera import Pose
 from covista_service.station.events import Keyframe, KeyframeId, Topic
 from covista_service.station.ledger import Counts, Ledger, Total
 from covista_service.station.options import StationOptions, nanoseconds
-from covista_service.station.prospects import Depth
+from covista_service.station.reach import Depth
 
 _PAST_BOOTS = 16
 # A robot's clock that falls back by more than this was set; by less, the message is late.

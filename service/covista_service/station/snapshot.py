@@ -20,7 +20,7 @@ from covista_service.station.events import Keyframe, KeyframeId, Pair
 from covista_service.station.ledger import Counts
 from covista_service.station.options import NS_PER_S, GroupingOptions
 from covista_service.station.outlooks import Outlook, Ratios
-from covista_service.station.pairs import PairRecord, pair_of
+from covista_service.station.pairs import Answer, Judged, PairRecord, apart, pair_of
 from covista_service.station.roster import Fix
 from covista_service.station.workload import Workload
 
@@ -31,7 +31,8 @@ Reason = Literal["no_pose", "gone"]
 class RobotView:
     """One robot; `camera` is that of its newest keyframe.
 
-    `keyframe` is the newest in use, `announced` the newest that came, usable or not.
+    `keyframe` is the newest in use, `announced` the newest that came, usable or not. `judged` is by which it was judged
+    whom its view may meet.
     """
 
     id: str
@@ -48,6 +49,7 @@ class RobotView:
     keyframes: Counts
     poses: Counts
     last_problem: str | None
+    judged: Judged | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,7 +134,10 @@ class GroupsView:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
-    """The station as of `now_ns`: ages and decay follow from the moment it was taken."""
+    """The station as of `now_ns`: ages and decay follow from the moment it was taken.
+
+    There are records of the pairs whose views may meet. All others that have been judged share nothing.
+    """
 
     now_ns: int
     robots: Mapping[str, RobotView]
@@ -150,7 +155,7 @@ class Snapshot:
     def pair(self, a: str, b: str) -> PairView:
         """One pair of known robots in either order, seen from the smaller id; KeyError if a robot is not known."""
         a, b = pair_of(self.robots[a].id, self.robots[b].id)
-        record = self.records.get((a, b), PairRecord())
+        record = self.records.get((a, b)) or PairRecord(self._apart(a, b))
         answer = record.answer
         age_ns = 0 if answer is None else self.now_ns - answer.computed_ns
         if answer is None or age_ns >= self.unknown_after_ns:
@@ -170,6 +175,10 @@ class Snapshot:
             answer.outlooks,
             answer.ratios,
         )
+
+    def _apart(self, a: str, b: str) -> Answer | None:
+        first, second = self.robots[a].judged, self.robots[b].judged
+        return None if first is None or second is None or a == b else apart(first, second)
 
     def pairs(self) -> Iterator[PairView]:
         """Every unordered pair of known robots once."""

@@ -15,6 +15,7 @@ from covista_service.station.events import (
     Event,
     ExtractFeatures,
     FeaturesExtracted,
+    GroupsChanged,
     GroupsEvaluated,
     Happened,
     Keyframe,
@@ -31,7 +32,7 @@ from covista_service.station.events import (
 from covista_service.station.extraction import Extractions
 from covista_service.station.groups import Groups, Ungrouped
 from covista_service.station.options import NS_PER_S, GroupingOptions, StationOptions, nanoseconds
-from covista_service.station.pairs import Pairs, pair_of
+from covista_service.station.pairs import Pairs
 from covista_service.station.roster import Robot, Roster
 from covista_service.station.snapshot import RobotView, Snapshot
 from covista_service.station.surveys import Read, Surveys
@@ -39,6 +40,9 @@ from covista_service.station.workload import Workload
 
 # A clock further off than this is worth a look.
 _CLOCK_OFF_NS = nanoseconds(10)
+
+# Everybody's presence is looked at so often; who is heard of, at once.
+_LOOK_NS = NS_PER_S // 10
 
 
 class Station:
@@ -57,6 +61,12 @@ class Station:
         self._surveys = Surveys(self._roster, self._pairs, self._groups, self.options, read)
         self._extractions = Extractions(self.options.capacity)
         self._views: dict[str, RobotView] = {}
+        # Robots by id, and those that stand in no group, until somebody comes or goes.
+        self._sorted: list[str] | None = None
+        self._outside: Ungrouped | None = None
+        # Who was heard of since presence was looked at, and when everybody's was.
+        self._heard: dict[str, None] = {}
+        self._looked_ns: int | None = None
         self._snapshot: Snapshot | None = None
 
     def receive(self, event: Event, now_ns: int) -> list[Effect]:
@@ -87,6 +97,17 @@ class Station:
         """Is there news that the next evaluation waits for, and that should not wait for the next event?"""
         return self._surveys.news
 
+    def resize(self, capacity: int) -> None:
+        """So many extractions, and so many surveys and surfaces, may be under way at once from now on.
+
+        ValueError for fewer than one.
+        """
+        if capacity < 1:
+            raise ValueError(f"a station needs at least one hand, not {capacity}")
+        self.options = replace(self.options, capacity=capacity)
+        self._surveys.resize(capacity)
+        self._extractions.capacity = capacity
+
     def set_grouping(self, options: GroupingOptions) -> None:
         """Group by other settings from the next Tick on."""
         self.options = replace(self.options, grouping=options)
@@ -101,7 +122,7 @@ class Station:
                     self._views[robot.id] = self._view(robot)
             self._snapshot = Snapshot(
                 now_ns,
-                {name: self._views[name] for name in sorted(self._views)},
+                {name: self._views[name] for name in self._names()},
                 self._groups.view,
                 self._groups.similarity,
                 self._pairs.records(),
@@ -129,7 +150,7 @@ class Station:
 
     def _workload(self) -> Workload:
         """What waits and what was done."""
-        return Workload()
+        return self._surveys.workload()
 
     def _token(self, event: TokenSeen | TokenLost, now_ns: int) -> None:
         if isinstance(event, TokenSeen):
@@ -226,39 +247,53 @@ class Station:
         newcomer = robot.id not in self._groups
         self._groups.place(robot.id, robot.fix.pose.centre_m)
         if newcomer:
-            for pair in (pair_of(robot.id, other) for other in self._groups.robots if other != robot.id):
-                self._groups.see(pair, self._pairs.overlaps(pair))
+            self._outside = None
+            self._surveys.neighbourhoods.place(robot.id)
 
     def _tick(self, now_ns: int) -> list[Effect]:
         effects: list[Effect] = [*self._presence(now_ns)]
         expired = self._pairs.expire(now_ns)
         for pair in expired:
             self._groups.see(pair, None)
+        lapsed = self._surveys.neighbourhoods.expire(now_ns)
         judged = self._surveys.judge(now_ns)
+        for robot in judged:
+            self._views.pop(robot, None)
         effects += self._extract()
         effects += self._surveys.start(now_ns)
         effects += self._regroup(now_ns)
-        if effects or expired or judged:
+        if effects or expired or lapsed or judged:
             self._snapshot = None
         return effects
 
     def _presence(self, now_ns: int) -> list[Happened]:
+        """Look at those who were heard of, and at everybody some times a second."""
+        heard, self._heard = self._heard, {}
+        everybody = self._looked_ns is None or not 0 <= now_ns - self._looked_ns < _LOOK_NS
+        if everybody:
+            self._looked_ns = now_ns
         happened: list[Happened] = []
-        for robot in sorted(self._roster, key=lambda robot: robot.id):
-            if self._roster.lapsed(robot, now_ns):
-                self._forget(robot.id)
-                happened.append(Happened(EventKind.STATUS, now_ns, f"{robot.id} is forgotten", (robot.id,)))
-                continue
-            status = self._roster.status(robot, now_ns)
-            if status is not robot.status:
-                robot.status = status
-                self._touch(robot.id)
-                happened.append(Happened(EventKind.STATUS, now_ns, f"{robot.id} is {status}", (robot.id,)))
-                if status is Status.GONE:
-                    self._groups.withdraw(robot.id)
-                elif robot.id not in self._groups:
-                    self._place(robot)
+        for name in list(self._names()) if everybody else sorted(heard):
+            robot = self._roster.get(name)
+            if robot is not None:
+                happened += self._look_at(robot, now_ns)
         return happened
+
+    def _look_at(self, robot: Robot, now_ns: int) -> list[Happened]:
+        if self._roster.lapsed(robot, now_ns):
+            self._forget(robot.id)
+            return [Happened(EventKind.STATUS, now_ns, f"{robot.id} is forgotten", (robot.id,))]
+        status = self._roster.status(robot, now_ns)
+        if status is robot.status:
+            return []
+        robot.status = status
+        self._outside = None
+        self._views.pop(robot.id, None)
+        if status is Status.GONE:
+            self._groups.withdraw(robot.id)
+        elif robot.id not in self._groups:
+            self._place(robot)
+        return [Happened(EventKind.STATUS, now_ns, f"{robot.id} is {status}", (robot.id,))]
 
     def _regroup(self, now_ns: int) -> list[Effect]:
         before = self._groups.view, self._groups.similarity
@@ -266,18 +301,30 @@ class Station:
         effects = self._groups.evaluate(self._ungrouped(), now_ns, at_once=bool(seen))
         if (self._groups.view, self._groups.similarity) != before:
             self._snapshot = None
-        if effects:
-            self._views.clear()
+        for effect in effects:
+            if isinstance(effect, GroupsChanged):
+                for robot in effect.robots:
+                    self._views.pop(robot, None)
         if seen:
             effects.append(GroupsEvaluated(seen))
         return effects
 
     def _ungrouped(self) -> Ungrouped:
-        return tuple(
-            (robot.id, "gone" if robot.status is Status.GONE else "no_pose")
-            for robot in sorted(self._roster, key=lambda robot: robot.id)
-            if robot.id not in self._groups
+        if self._outside is not None:
+            return self._outside
+        outside: Ungrouped = tuple(
+            (robot, "gone" if self._roster[robot].status is Status.GONE else "no_pose")
+            for robot in self._names()
+            if robot not in self._groups
         )
+        self._outside = outside
+        return outside
+
+    def _names(self) -> list[str]:
+        """All robots, sorted."""
+        if self._sorted is None:
+            self._sorted = sorted(robot.id for robot in self._roster)
+        return self._sorted
 
     def _forget(self, robot: str) -> None:
         self._groups.withdraw(robot)
@@ -285,10 +332,13 @@ class Station:
         self._extractions.forget(robot)
         self._roster.forget(robot)
         self._views.pop(robot, None)
-        self._snapshot = None
+        self._snapshot = self._sorted = self._outside = None
 
     def _touch(self, robot: str) -> Robot:
+        if robot not in self._roster:
+            self._sorted = self._outside = None
         self._views.pop(robot, None)
+        self._heard[robot] = None
         return self._roster.meet(robot)
 
     def _view(self, robot: Robot) -> RobotView:
@@ -308,6 +358,7 @@ class Station:
             keyframes=robot.ledgers["keyframe"].counts(),
             poses=robot.ledgers["pose"].counts(),
             last_problem=robot.last_problem,
+            judged=self._surveys.neighbourhoods[robot.id],
         )
 
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from covista_schemas.reports import EventKind, FoundBy
+from covista_schemas.reports import EventKind
 
-from covista_service.perception.comparison import Outcome
-from covista_service.perception.frustum import Frusta
 from covista_service.perception.scene import Evidence
 from covista_service.station import prospects
 from covista_service.station.agenda import Agenda
@@ -17,16 +15,17 @@ from covista_service.station.events import (
     Happened,
     Keyframe,
     KeyframeId,
-    Pair,
     SurfacesBuilt,
     SurveyDone,
     SurveyPair,
 )
 from covista_service.station.groups import Groups
+from covista_service.station.neighbourhoods import Neighbourhoods
 from covista_service.station.options import StationOptions
 from covista_service.station.outlooks import Outlook, Outlooks, Ratios, view_of
 from covista_service.station.pairs import Answer, Pairs
 from covista_service.station.roster import Robot, Roster
+from covista_service.station.workload import Workload
 
 # The overlap of an outlook with each of others, as `prospects.read` tells it.
 Read = Callable[[Outlook, Sequence[tuple[Outlook, Ratios]], int], list[Answer]]
@@ -43,11 +42,10 @@ class Surveys:
         self._groups = groups
         self._capacity = options.capacity
         self._overlaps_of = read
-        self._agenda = Agenda(roster, pairs, options)
+        self._agenda = Agenda(roster, pairs, options, groups.boundary)
         self._outlooks = Outlooks()
         self._corrections = Corrections()
-        self._to_judge: dict[str, None] = {}
-        self._reaches: dict[str, prospects.Reach] = {}
+        self.neighbourhoods = Neighbourhoods(roster, pairs, groups, self._agenda, self._corrections, options)
         # Arrivals of keyframes whose first survey no surface has been built with yet; those of them that a survey has
         # seen; and those whose first survey is in since the last evaluation.
         self._unseen: dict[str, dict[KeyframeId, int]] = {}
@@ -61,22 +59,14 @@ class Surveys:
         kept = [name for name in unseen if self._agenda.under_way(name) or self._outlooks.building(name)]
         self._compared.difference_update(unseen.keys() - set(kept))
         self._unseen[robot.id] = {**{name: unseen[name] for name in kept}, keyframe.id: keyframe.arrived_ns}
-        self._to_judge.setdefault(robot.id)
+        self.neighbourhoods.note(robot.id)
         earlier = self._outlooks.keyframe(keyframe)
         self._agenda.fresh(robot.id)
         self._agenda.moved(robot.id, earlier)
 
-    def judge(self, now_ns: int) -> bool:
-        """Judge the pairs of all robots with a new keyframe or depth: may they meet, and what is to be expected?
-
-        False if there was nothing to judge.
-        """
-        robots = [self._roster[robot] for robot in self._to_judge]
-        self._to_judge.clear()
-        for robot in robots:
-            if robot.keyframe is not None:
-                self._judge(robot, robot.keyframe, now_ns)
-        return bool(robots)
+    def judge(self, now_ns: int) -> list[str]:
+        """Judge the pairs of all robots with a new keyframe or depth, as to whether they may meet; who they are."""
+        return self.neighbourhoods.judge(now_ns)
 
     def start(self, now_ns: int) -> list[Effect]:
         """As many surfaces, and then surveys, as there are hands for."""
@@ -92,6 +82,14 @@ class Surveys:
     def take(self, event: SurveyDone | SurfacesBuilt, now_ns: int) -> list[Happened]:
         """Take in what a worker has found."""
         return self._surveyed(event, now_ns) if isinstance(event, SurveyDone) else self._built(event, now_ns)
+
+    def resize(self, capacity: int) -> None:
+        """So many surveys and surfaces may be under way at once from now on; what is under way stays so."""
+        self._capacity = self._agenda.capacity = capacity
+
+    def workload(self) -> Workload:
+        """What waits and what was done."""
+        return self._agenda.workload()
 
     def correction(self, robot: str) -> Correction | None:
         """How far a robot's reported pose is off, None while nothing is known of it."""
@@ -109,12 +107,11 @@ class Surveys:
 
     def forget(self, robot: str) -> None:
         """Drop a robot and its pairs."""
+        self.neighbourhoods.forget(robot)
         self._agenda.forget(robot)
         self._pairs.forget(robot)
         self._outlooks.forget(robot)
         self._corrections.forget(robot)
-        self._to_judge.pop(robot, None)
-        self._reaches.pop(robot, None)
         self._compared.difference_update(self._unseen.pop(robot, {}))
 
     def _surveyed(self, event: SurveyDone, now_ns: int) -> list[Happened]:
@@ -129,7 +126,7 @@ class Surveys:
                 name for name in (event.first, event.second) if name in self._unseen.get(name.robot, ())
             )
             self._pairs.surveyed(*keyframes, event.found)
-            self._look_over(pair, now_ns)
+            self.neighbourhoods.look_over(pair)
             self._agenda.again(pair)
         if event.found is None:
             text = f"the survey of {pair[0]} and {pair[1]} failed: {event.problem}"
@@ -146,7 +143,7 @@ class Surveys:
             if outlook is not None:
                 again = held is not None and held.keyframe.id == keyframe.id
                 happened += self._corrections.note(outlook, now_ns, again=again)
-                self._deepen(robot, outlook)
+                self.neighbourhoods.deepen(robot, outlook)
                 self._read(outlook, now_ns)
             self._note(keyframe.id)
         if event.settled is None:
@@ -159,45 +156,6 @@ class Surveys:
     def _survey(self, first: Keyframe, second: Keyframe) -> SurveyPair:
         one, other = (view_of(keyframe, self._outlooks.pose(keyframe)) for keyframe in (first, second))
         return SurveyPair(first.id, second.id, one, other)
-
-    def _judge(self, robot: Robot, keyframe: Keyframe, now_ns: int, among: Sequence[str] | None = None) -> None:
-        """Judge a robot's pairs with all others, or with those named alone."""
-        others = [
-            (other, other.keyframe)
-            for other in (self._roster if among is None else map(self._roster.__getitem__, among))
-            if other.keyframe is not None and other is not robot
-        ]
-        frusta = Frusta([self._reach(*other).frustum for other in others])
-        for (other, beside), meet in zip(others, frusta.may_meet(self._reach(robot, keyframe).frustum), strict=True):
-            both = (keyframe, beside) if robot.id < other.id else (beside, keyframe)
-            pair = (both[0].id.robot, both[1].id.robot)
-            plausible = bool(meet) or self._worth_another_look(pair, both)
-            self._agenda.judge(pair, plausible=plausible)
-            if not plausible:
-                again = self._pairs.enter(pair, Answer((0.0, 0.0), FoundBy.PREDICTED, now_ns, *both))
-                self._groups.see(pair, self._pairs.overlaps(pair), again=again)
-
-    def _look_over(self, pair: Pair, now_ns: int) -> None:
-        """A survey that verifies a pair makes it worth reading; one that does not ends what was kept for that alone."""
-        robot = self._roster[pair[0]]
-        if robot.keyframe is not None:
-            self._judge(robot, robot.keyframe, now_ns, (pair[1],))
-
-    def _worth_another_look(self, pair: Pair, keyframes: tuple[Keyframe, Keyframe]) -> bool:
-        """Do images say that there is something in common? They outrank what poses and depths say of views.
-
-        What was seen in common before is looked at again, if only to find that it is no more.
-        """
-        record = self._pairs[pair]
-        if record.surveyed == (keyframes[0].id, keyframes[1].id):
-            return record.outcome == Outcome.MEASURED
-        return record.measured and sum(self._pairs.overlaps(pair) or ()) > 0
-
-    def _reach(self, robot: Robot, keyframe: Keyframe) -> prospects.Reach:
-        held = self._reaches.get(robot.id)
-        if held is None or not held.is_of(keyframe, robot.depth):
-            held = self._reaches[robot.id] = prospects.Reach.of(keyframe, robot.depth)
-        return held
 
     def _read(self, outlook: Outlook, now_ns: int) -> None:
         """Read the overlaps of a robot's outlook with those of all whose views may meet its own."""
@@ -213,14 +171,3 @@ class Surveys:
         if keyframe in self._compared:
             self._compared.discard(keyframe)
             self._seen.append((keyframe, self._unseen[keyframe.robot].pop(keyframe)))
-
-    def _deepen(self, robot: Robot, outlook: Outlook) -> None:
-        """Take the depth that a robot's surface tells; who may see what it sees is judged by it."""
-        depth, held = prospects.depth_of(outlook), robot.depth
-        if depth is None:
-            return
-        if held is None or held.keyframe != depth.keyframe:
-            self._to_judge.setdefault(robot.id)
-        elif held.points >= depth.points:
-            return
-        robot.depth = depth

@@ -1,0 +1,34 @@
+"""How far the views of a swarm reach: a bound for those whose own depth is not known yet."""
+
+from __future__ import annotations
+
+import math
+from statistics import median
+
+# So many robots must have told how far they see; a view that is not known reaches so many times as far as theirs do.
+_ENOUGH = 8
+_TIMES = 3.0
+# It is told anew after news of one robot in so many.
+_SHARE = 4
+
+
+class Horizon:
+    """Infinite until enough is known, then three times what is usual in the swarm."""
+
+    def __init__(self) -> None:
+        self._far_m: dict[str, float] = {}
+        self._news = 0
+        self.farthest_m = math.inf
+
+    def note(self, robot: str, far_m: float) -> bool:
+        """A robot's view reaches so far; True if there is a bound from now on."""
+        self._far_m[robot] = far_m
+        self._news += 1
+        if len(self._far_m) < _ENOUGH or (math.isfinite(self.farthest_m) and self._news * _SHARE < len(self._far_m)):
+            return False
+        before, self.farthest_m, self._news = self.farthest_m, _TIMES * median(self._far_m.values()), 0
+        return math.isinf(before)
+
+    def forget(self, robot: str) -> None:
+        """Drop a robot."""
+        self._far_m.pop(robot, None)

@@ -1,0 +1,247 @@
+"""Whose views may meet, as far as is known: judged when a robot has a new keyframe or depth, among those near it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from covista_service.perception.camera import Pose
+from covista_service.perception.comparison import Outcome
+from covista_service.perception.frustum import Frusta
+from covista_service.station.agenda import Agenda
+from covista_service.station.corrections import Corrections
+from covista_service.station.events import Keyframe, Pair
+from covista_service.station.grid import Grid
+from covista_service.station.groups import Groups
+from covista_service.station.horizon import Horizon
+from covista_service.station.options import StationOptions, nanoseconds
+from covista_service.station.outlooks import Outlook
+from covista_service.station.pairs import Answer, Judged, Pairs, apart, pair_of
+from covista_service.station.reach import Reach, depth_of, farthest_m
+from covista_service.station.roster import Robot, Roster
+
+# A smoothed overlap that has come down so far need not be told any more zeros.
+_NEGLIGIBLE = 1e-4
+
+
+class Neighbourhoods:
+    """Partners of every robot: those whose views may meet its own, and those with whom images have said so.
+
+    Who is no partner shares nothing: of such a pair nothing is kept but when its two robots were judged, and a row of
+    zeros in the groups. So a keyframe costs what its neighbours cost, whatever the size of the swarm.
+    """
+
+    def __init__(
+        self,
+        roster: Roster,
+        pairs: Pairs,
+        groups: Groups,
+        agenda: Agenda,
+        corrections: Corrections,
+        options: StationOptions,
+    ) -> None:
+        self._roster = roster
+        self._pairs = pairs
+        self._groups = groups
+        self._agenda = agenda
+        self._corrections = corrections
+        self._unknown_after_ns = nanoseconds(options.unknown_after_s)
+        self._to_judge: dict[str, None] = {}
+        self._reaches: dict[str, Reach] = {}
+        self._grid = Grid()
+        self._horizon = Horizon()
+        self._judged: dict[str, Judged] = {}
+        # By age, the oldest first; and those too old for a pair of two such to stand for anything.
+        self._ageing: dict[str, None] = {}
+        self._lapsed: dict[str, None] = {}
+        # Pairs that have parted, and whose smoothed overlap has not come down yet.
+        self._receding: dict[str, dict[str, None]] = {}
+
+    def __getitem__(self, robot: str) -> Judged | None:
+        """By which keyframe a robot was judged last, None if it was not yet."""
+        return self._judged.get(robot)
+
+    def note(self, robot: str) -> None:
+        """A robot has something new: judge it next time."""
+        self._to_judge.setdefault(robot)
+
+    def deepen(self, robot: Robot, outlook: Outlook) -> None:
+        """Take the depth that a robot's surface tells; who may see what it sees is judged by it."""
+        depth, held = depth_of(outlook), robot.depth
+        if depth is None:
+            return
+        if held is None or held.keyframe != depth.keyframe:
+            self.note(robot.id)
+        elif held.points >= depth.points:
+            return
+        robot.depth = depth
+        if self._horizon.note(robot.id, farthest_m(depth)):
+            for name, reach in self._reaches.items():
+                if reach.endless:
+                    self.note(name)
+
+    def judge(self, now_ns: int) -> list[str]:
+        """Judge the pairs of all robots with a new keyframe or depth; who they are."""
+        robots = [self._roster[robot] for robot in self._to_judge]
+        self._to_judge.clear()
+        judged = [(robot, robot.keyframe) for robot in robots if robot.keyframe is not None]
+        # All are where they are now before any is held against another.
+        for robot, keyframe in judged:
+            self._settle(robot, keyframe)
+        for robot, keyframe in judged:
+            self._judge(robot, keyframe, now_ns)
+        return [robot.id for robot in robots]
+
+    def look_over(self, pair: Pair) -> None:
+        """A survey that verifies a pair makes it worth reading; one that does not ends what was kept for that alone."""
+        reaches = self._reaches[pair[0]], self._reaches[pair[1]]
+        if reaches[0].frustum.may_meet(reaches[1].frustum) or self._worth_another_look(pair):
+            self._meet(pair, None)
+        else:
+            self._part(pair)
+
+    def beside(self, robot: str, pose: Pose) -> list[str]:
+        """Robots whose views may meet this one's when it is at another pose; nobody while it has not been judged."""
+        reach = self._reaches.get(robot)
+        if reach is None:
+            return []
+        keyframe = replace(reach.keyframe, pose=pose)
+        return self._meeting(robot, Reach.of(keyframe, reach.depth, self._horizon.farthest_m, self._corrections[robot]))
+
+    def place(self, robot: str) -> None:
+        """A robot takes part in the groups from now on, with all that is known of its pairs."""
+        others = [other for other in self._groups.robots if other != robot]
+        for other in others:
+            pair = pair_of(robot, other)
+            if pair in self._pairs:
+                self._groups.see(pair, self._pairs.overlaps(pair))
+        self._share_nothing(robot, others)
+
+    def expire(self, now_ns: int) -> bool:
+        """Let the answers about robots that have not been judged for long stand no more; False if there are none."""
+        lapsed: list[str] = []
+        for robot in self._ageing:
+            if now_ns - self._judged[robot].first_ns < self._unknown_after_ns:
+                break
+            lapsed.append(robot)
+        for robot in lapsed:
+            del self._ageing[robot]
+            others = [other for other in self._lapsed if pair_of(robot, other) not in self._pairs]
+            self._groups.see_row(robot, others, None)
+            self._lapsed[robot] = None
+        return bool(lapsed)
+
+    def forget(self, robot: str) -> None:
+        """Drop a robot."""
+        self._to_judge.pop(robot, None)
+        self._reaches.pop(robot, None)
+        self._grid.remove(robot)
+        self._horizon.forget(robot)
+        for places in (self._judged, self._ageing, self._lapsed):
+            places.pop(robot, None)
+        for other in self._receding.pop(robot, {}):
+            _discard(self._receding, other, robot)
+
+    def _settle(self, robot: Robot, keyframe: Keyframe) -> None:
+        held = self._reaches.get(robot.id)
+        if held is not None and held.is_of(keyframe, robot.depth) and not held.endless:
+            return
+        reach = Reach.of(keyframe, robot.depth, self._horizon.farthest_m, self._corrections[robot.id])
+        self._reaches[robot.id] = reach
+        self._grid.put(robot.id, reach.box)
+
+    def _meeting(self, robot: str, reach: Reach) -> list[str]:
+        near = [other for other in self._grid.meeting(reach.box) if other != robot]
+        if not near:
+            return []
+        meet = Frusta([self._reaches[other].frustum for other in near]).may_meet(reach.frustum)
+        return [other for other, met in zip(near, meet.tolist(), strict=True) if met]
+
+    def _judge(self, robot: Robot, keyframe: Keyframe, now_ns: int) -> None:
+        name, former = robot.id, self._judged.get(robot.id)
+        partners = dict.fromkeys(self._meeting(name, self._reaches[name]))
+        for other in self._pairs.beside(name):
+            if other not in partners:
+                pair = pair_of(name, other)
+                if self._worth_another_look(pair):
+                    partners[other] = None
+                else:
+                    self._part(pair)
+        for other in partners:
+            self._meet(pair_of(name, other), self._apart(name, other))
+        if former is None or former.keyframe is not keyframe:
+            self._enter(name, Judged(keyframe, now_ns))
+            self._recede(name)
+
+    def _enter(self, robot: str, judged: Judged) -> None:
+        """A robot is judged by another keyframe: what it shares with nobody else stands from now on."""
+        first, lapsed = robot not in self._judged, robot in self._lapsed
+        for places in (self._ageing, self._lapsed):
+            places.pop(robot, None)
+        self._judged[robot], self._ageing[robot] = judged, None
+        if first or lapsed:
+            self._share_nothing(robot, self._judged if first else self._lapsed)
+
+    def _apart(self, robot: str, other: str) -> Answer | None:
+        """What stands for two robots as those whose views cannot meet, as they were judged last."""
+        first, second = (self._judged.get(name) for name in pair_of(robot, other))
+        return None if first is None or second is None else apart(first, second)
+
+    def _meet(self, pair: Pair, answer: Answer | None) -> None:
+        self._pairs.meet(pair, answer)
+        self._agenda.judge(pair, plausible=True)
+        for robot, other in (pair, pair[::-1]):
+            _discard(self._receding, robot, other)
+
+    def _part(self, pair: Pair) -> None:
+        """What is known of a pair is that it shares nothing."""
+        self._agenda.judge(pair, plausible=False)
+        answer = self._pairs.part(pair).answer
+        current = tuple(self._reaches[robot].keyframe.id for robot in pair)
+        held = self._groups.see(pair, (0.0, 0.0), again=answer is not None and answer.keyframes == current)
+        if held is not None and held > _NEGLIGIBLE:
+            for robot, other in (pair, pair[::-1]):
+                self._receding.setdefault(robot, {})[other] = None
+
+    def _recede(self, robot: str) -> None:
+        """Another keyframe that shares nothing with those that it shared something with."""
+        for other in list(self._receding.get(robot, ())):
+            held = self._groups.see(pair_of(robot, other), (0.0, 0.0))
+            if held is None or held <= _NEGLIGIBLE:
+                _discard(self._receding, robot, other)
+                _discard(self._receding, other, robot)
+
+    def _share_nothing(self, robot: str, others: Iterable[str]) -> None:
+        """Enter zeros for a robot and all of those whom it is known to share nothing with."""
+        judged = self._judged.get(robot)
+        if judged is None:
+            return
+        lapsed = robot in self._lapsed
+        known = [
+            other
+            for other in others
+            if other != robot
+            and other in self._judged
+            and not (lapsed and other in self._lapsed)
+            and pair_of(robot, other) not in self._pairs
+        ]
+        self._groups.see_row(robot, known, 0.0)
+
+    def _worth_another_look(self, pair: Pair) -> bool:
+        """Do images say that there is something in common? They outrank what poses and depths say of views.
+
+        What was seen in common before is looked at again, if only to find that it is no more.
+        """
+        record = self._pairs[pair]
+        keyframes = [self._roster[robot].keyframe for robot in pair]
+        if record.surveyed == tuple(keyframe and keyframe.id for keyframe in keyframes):
+            return record.outcome == Outcome.MEASURED
+        return record.measured and sum(self._pairs.overlaps(pair) or ()) > 0
+
+
+def _discard(places: dict[str, dict[str, None]], robot: str, other: str) -> None:
+    held = places.get(robot)
+    if held is not None:
+        held.pop(other, None)
+        if not held:
+            del places[robot]
