@@ -14,6 +14,8 @@ from covista_service.perception.camera import Camera, Floats, Pose
 _DEVIATIONS = 2.0
 # Beyond it a doubt about the direction says no more than that the camera may look anywhere ahead.
 _MOST_RAD = math.radians(45)
+# Whatever is reported, sums of it are finite.
+_MOST_VARIANCE = 1e24
 
 # Least and greatest coordinates of a box in the world, in metres; infinite where it is endless.
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]
@@ -33,7 +35,8 @@ class Doubt:
     @classmethod
     def of(cls, covariance: NDArray[np.floating]) -> Doubt:
         """From the covariance (6, 6) of position (m) and rotation vector (rad); what is no covariance counts as 0."""
-        both = (covariance + covariance.T) / 2
+        sound = np.clip(covariance, -_MOST_VARIANCE, _MOST_VARIANCE)
+        both = (sound + sound.T) / 2
         distance_m, angle_rad = (
             _DEVIATIONS * math.sqrt(max(0.0, float(np.linalg.eigvalsh(block)[-1])))
             for block in (both[:3, :3], both[3:, 3:])

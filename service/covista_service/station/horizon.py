@@ -5,15 +5,18 @@ from __future__ import annotations
 import math
 from statistics import median
 
-# So many robots must have told how far they see; a view that is not known reaches so many times as far as theirs do.
+# So many robots must have told how far they may see.
 _ENOUGH = 8
-_TIMES = 3.0
 # It is told anew after news of one robot in so many.
 _SHARE = 4
 
 
 class Horizon:
-    """Infinite until enough is known, then three times what is usual in the swarm."""
+    """Infinite until enough is known, then what is usual in the swarm: the median of how far views may reach.
+
+    That is three times the depth of what has been seen, so there is room in it. Who sees farther than that without
+    anybody's having told its depth is found by the sweep.
+    """
 
     def __init__(self) -> None:
         self._far_m: dict[str, float] = {}
@@ -26,7 +29,7 @@ class Horizon:
         self._news += 1
         if len(self._far_m) < _ENOUGH or (math.isfinite(self.farthest_m) and self._news * _SHARE < len(self._far_m)):
             return False
-        before, self.farthest_m, self._news = self.farthest_m, _TIMES * median(self._far_m.values()), 0
+        before, self.farthest_m, self._news = self.farthest_m, median(self._far_m.values()), 0
         return math.isinf(before)
 
     def forget(self, robot: str) -> None:
