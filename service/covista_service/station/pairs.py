@@ -92,6 +92,9 @@ class Pairs:
     def __getitem__(self, pair: Pair) -> PairRecord:
         return self._records.get(pair, _NOTHING)
 
+    def __len__(self) -> int:
+        return len(self._records)
+
     def __contains__(self, pair: object) -> bool:
         return pair in self._records
 
@@ -201,9 +204,6 @@ def apart(first: Judged, second: Judged) -> Answer:
     """
     computed_ns = max(first.first_ns, second.first_ns)
     return Answer((0.0, 0.0), FoundBy.PREDICTED, computed_ns, first.keyframe, second.keyframe)
-
-    def __len__(self) -> int:
-        return len(self._records)
 
 
 def _same(held: Answer, answer: Answer) -> bool:

@@ -128,6 +128,9 @@ class Swarm(RuleBasedStateMachine):
     def tell(self, a: str, b: str, q_a: float | None, q_b: float | None) -> None:
         """What the matrix is told, and what should come of it."""
         self.affinity.see(a, b, q_a, q_b)
+        self.expect(a, b, q_a, q_b)
+
+    def expect(self, a: str, b: str, q_a: float | None, q_b: float | None) -> None:
         for pair, q in (((a, b), q_a), ((b, a), q_b)):
             self.shares.pop(pair, None)
             if q is not None:
@@ -184,6 +187,17 @@ class Swarm(RuleBasedStateMachine):
         for b in rng.permutation(robots)[:5].tolist():
             if b != a:
                 self.tell(a, b, q, float(rng.uniform()))
+
+    @precondition(lambda self: self.position_m)
+    @rule(pick=picks, count=st.integers(0, 12), known=st.floats(0, 1))
+    def see_row(self, pick: int, count: int, known: float) -> None:
+        rng, robot = np.random.default_rng(pick), self.robot(pick)
+        others = [name for name in rng.permutation(sorted(self.position_m)).tolist() if name != robot][:count]
+        q = rng.choice([0.0, 0.25, 0.7, 1.0], (len(others), 2))
+        q[rng.uniform(size=q.shape) > known] = np.nan
+        self.affinity.see_row(robot, others, q)
+        for other, (q_own, q_other) in zip(others, q.tolist(), strict=True):
+            self.expect(robot, other, *(None if math.isnan(share) else share for share in (q_own, q_other)))
 
     @precondition(lambda self: self.position_m)
     @rule(pick=picks)
@@ -406,3 +420,33 @@ def test_of_one_pair_of_pictures_the_last_reading_counts(smoothing: float, told:
         expected += smoothing * (readings[-1] - expected)
     assert affinity.mutual[0, 1] == pytest.approx(expected, abs=1e-12)
     assert 0 <= affinity.mutual[0, 1] <= 1
+
+
+rows = st.lists(
+    st.tuples(st.lists(st.tuples(shares | st.none(), shares | st.none()), min_size=3, max_size=3), st.booleans()),
+    max_size=8,
+)
+
+
+@given(smoothing=st.floats(0.05, 1), told=rows)
+def test_a_row_at_once_is_its_pairs_one_by_one(smoothing: float, told) -> None:
+    at_once, one_by_one = (row(0, 1, 2, 3, smoothing=smoothing) for _ in range(2))
+    others = ["r3", "r0", "r2"]
+    for pairs, again in told:
+        q = np.array([[np.nan if share is None else share for share in pair] for pair in pairs])
+        at_once.see_row("r1", others, q, again=again)
+        mutual = [one_by_one.see("r1", other, *pair, again=again) for other, pair in zip(others, pairs, strict=True)]
+        np.testing.assert_array_equal(at_once.mutual, one_by_one.mutual)
+        np.testing.assert_array_equal(at_once.overlap, one_by_one.overlap)
+        np.testing.assert_array_equal(at_once._once, one_by_one._once)
+        held = one_by_one.mutual[1, [3, 0, 2]].tolist()
+        assert mutual == [None if math.isnan(share) else share for share in held]
+
+
+def test_a_row_of_what_is_no_share_or_of_the_robot_itself_is_refused_and_changes_nothing() -> None:
+    affinity = row(0, 1, 2)
+    for others, q in ((["r1", "r2"], [[0.5, 1.001], [0, 0]]), (["r1"], [[-0.1, 0]]), (["r0"], [[0.5, 0.5]])):
+        with pytest.raises(ValueError, match=r"a share lies from 0 to 1|with itself"):
+            affinity.see_row("r0", others, np.array(q))
+    affinity.see_row("r0", [], np.zeros((0, 2)))
+    assert np.isnan(affinity.mutual[np.triu_indices(3, 1)]).all()

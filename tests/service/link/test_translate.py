@@ -3,7 +3,8 @@ import pytest
 from covista_schemas import codec, features
 from covista_schemas.messages import Camera, Distortion, Keyframe, Pose
 from covista_service.link.mailbox import Letter, Mailboxes
-from covista_service.link.translate import FAULT, camera_of, events_of, pose_of
+from covista_service.link.translate import FAULT, camera_of, doubt_of, events_of, pose_of
+from covista_service.perception.extent import UNTOLD
 from covista_service.station.events import (
     Event,
     KeyframeArrived,
@@ -57,6 +58,13 @@ def test_orientations_are_world_from_camera() -> None:
     quarter = np.sqrt(0.5)
     pose = pose_of(Pose((1, 2, 3), (0, 0, quarter, quarter)))
     np.testing.assert_allclose(pose.world_from_camera @ [1, 0, 0], [0, 1, 0], atol=1e-12)
+
+
+def test_a_covariance_becomes_a_doubt_about_the_pose() -> None:
+    spread = np.diag([0.01, 0.01, 0.04, 1e-4, 1e-6, 1e-6])
+    told = doubt_of(Pose((1, 2, 3), covariance=tuple(spread.ravel().tolist())))
+    assert (told.distance_m, told.angle_rad, told.depth_share) == pytest.approx((0.4, 0.02, 0.0))
+    assert doubt_of(Pose((1, 2, 3))) == UNTOLD
 
 
 def test_distortion_is_kept() -> None:

@@ -3,7 +3,8 @@
 from collections import Counter
 from itertools import combinations
 
-from covista_service.station.events import SurveyPair
+import pytest
+from covista_service.station.events import ExtractFeatures, SurveyPair
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -200,3 +201,89 @@ def test_the_first_survey_of_a_keyframe_is_told_once_with_its_arrival() -> None:
     scene.wait(1)
     scene.send("r1")
     assert [name.robot for name, _ in evaluated(scene.settle(lambda job: NOTHING))] == ["r1"]
+
+
+def test_surveys_whose_keyframe_is_replaced_before_they_begin_are_counted_and_never_begun() -> None:
+    scene = Scene.of(capacity=1)
+    for robot in ("r1", "r2", "r3"):
+        scene.send(robot)
+    (job,) = jobs(scene.tick())
+    assert (job.first.robot, job.second.robot) == ("r1", "r2")
+    waiting = scene.snapshot.workload.waiting
+    assert (waiting["fresh"], waiting["regular"]) == (1, 2)
+    scene.send("r3")
+    scene.tick()
+    # r1 with r3, and r2 with r3.
+    assert scene.snapshot.workload.outdated == 2
+    later = jobs(scene.work([job]))
+    assert {name.sequence for job in later[1:] for name in (job.first, job.second) if name.robot == "r3"} == {1}
+    assert scene.snapshot.workload.outdated == 2
+
+
+def test_what_was_started_is_counted_by_queue_and_what_waits_goes_to_nothing() -> None:
+    scene = Scene.of(capacity=2)
+    for number in range(5):
+        scene.send(f"r{number}", pose(0.1 * number))
+    told = scene.settle()
+    scene.send("r0", pose(0.4))
+    told += scene.settle()
+    load = scene.snapshot.workload
+    assert load.waiting == {"fresh": 0, "regular": 0, "moved": 0}
+    assert sum(load.started.values()) == len(jobs(told))
+    assert load.started["moved"] == 1
+    assert load.under_way == 0
+
+
+def test_hands_may_come_and_go_while_the_station_runs() -> None:
+    scene = Scene.of(capacity=1)
+    for number in range(6):
+        scene.send(f"r{number}", pose(0.1 * number))
+    under_way = jobs(scene.tick())
+    assert len(under_way) == 1
+    scene.station.resize(4)
+    under_way += jobs(scene.tick())
+    assert len(under_way) == scene.snapshot.workload.under_way == 4
+    scene.station.resize(2)
+    for expected in (3, 2, 2):
+        scene.done(under_way.pop(0), NOTHING)
+        under_way += jobs(scene.tick())
+        assert len(under_way) == expected
+    with pytest.raises(ValueError, match="at least one"):
+        scene.station.resize(0)
+    assert scene.station.options.capacity == 2
+
+
+def test_more_hands_extract_more_at_once() -> None:
+    scene = Scene.of(capacity=1)
+    for robot in ("r1", "r2", "r3"):
+        scene.send(robot, image=True)
+    scene.station.resize(3)
+    assert len([effect for effect in scene.tick() if isinstance(effect, ExtractFeatures)]) == 2
+
+
+def test_pairs_whose_views_have_changed_more_are_surveyed_more_often() -> None:
+    """Two robots that stand and two that drive, all in view of each other, with hands for a third of the pairs."""
+    scene, by_pair, under_way = Scene.of(capacity=1), Counter(), []
+    for step in range(400):
+        for number in range(4):
+            away = 0.4 * (step % 5) if number > 1 else 0.0
+            scene.send(f"r{number}", pose(0.1 * number + away))
+        for job in under_way:
+            scene.done(job, measured())
+        under_way = jobs(scene.wait(0.25))
+        by_pair.update((job.first.robot, job.second.robot) for job in under_way)
+    assert by_pair["r2", "r3"] > by_pair["r0", "r1"]
+    assert by_pair["r0", "r1"] >= 400 / 6 / 6
+
+
+def test_a_keyframe_whose_partner_is_busy_waits_for_it_and_holds_up_nobody() -> None:
+    scene = Scene.of(capacity=3)
+    scene.send("r1")
+    scene.send("r2")
+    (job,) = jobs(scene.tick())
+    scene.send("r1")
+    assert jobs(scene.tick()) == []
+    assert scene.snapshot.workload.waiting["fresh"] == 1
+    later = jobs(scene.work([job]))
+    assert [(job.first.sequence, job.second.sequence) for job in later[1:2]] == [(1, 0)]
+    assert scene.snapshot.workload.waiting["fresh"] == 0

@@ -172,3 +172,18 @@ def test_a_picture_whose_robot_is_forgotten_meanwhile_is_dropped() -> None:
     scene.wait(4)
     scene.receive(FeaturesExtracted(job.keyframe.id, FEATURES))
     assert scene.station.census().accounts["keyframe"] == Counts(received=1, dropped={FORGOTTEN: 1})
+
+
+def test_everybody_is_looked_at_ten_times_a_second_and_who_is_heard_of_at_once() -> None:
+    scene = Scene()
+    scene.send("r1")
+    scene.send("r2")
+    scene.tick()
+    scene.wait(4.95)
+    assert happenings(scene.wait(0.05)) == []
+    assert happenings(scene.wait(0.05)) == [("status", "r1 is stale"), ("status", "r2 is stale")]
+    scene.send_pose("r2", pose(1))
+    assert happenings(scene.tick())[0] == ("status", "r2 is live")
+    scene.now_ns -= 3600 * S
+    scene.receive(TokenSeen("r1", "b0"))
+    assert ("status", "r1 is live") in happenings(scene.tick())
