@@ -107,7 +107,7 @@ class Settings(LiveSettings, BaseSettings):
     forget_after_s: Seconds = Field(default=600, description="A robot is forgotten after this silence.")
     decay_after_s: Seconds = Field(default=60, description="An overlap decays when it is older than this.")
     unknown_after_s: Seconds = Field(default=600, description="An overlap is unknown when it is older than this.")
-    retry_after_s: Seconds = Field(default=30, description="Every possible pair is tried once in so long.")
+    retry_after_s: Seconds = Field(default=30, description="No pair whose views cannot meet is tried again sooner.")
 
     @property
     def api_address(self) -> Address:

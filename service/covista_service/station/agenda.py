@@ -16,8 +16,9 @@ from covista_service.station.roster import Robot, Roster
 from covista_service.station.waiting import UNSEEN, Plan, Waiting
 from covista_service.station.workload import Workload
 
-_SWEEP_EVERY = 8
-_MOTION_EVERY = 4
+_QUEUES = ("fresh", "regular", "moved", "sweep")
+# Whose turn it is, start by start; who has nothing leaves it to the others, in the order above.
+_TURNS = ("fresh", "regular", "fresh", "moved", "fresh", "regular", "fresh", "sweep")
 _NOBODY: Mapping[str, Plan] = {}
 # How near a pair is to a boundary of groups, from 0 to 1.
 Boundary = Callable[[Pair], float]
@@ -93,16 +94,8 @@ class Agenda:
         """The next pair of keyframes to survey, under way from now on; None if nothing is due or all hands are full."""
         if len(self._in_flight) >= self.capacity:
             return None
-        starts = self._started.total()
-        queues: list[tuple[str, Callable[[], Pair | None]]]
-        queues = [("fresh", self._next_fresh), ("regular", self._next_regular)]
-        if starts % 2:
-            queues.reverse()
-        swept = lambda: self._patrol.next(now_ns, self.partners)  # noqa: E731 - a queue among others
-        queues.insert(0 if starts % _SWEEP_EVERY == _SWEEP_EVERY - 1 else 2, ("sweep", swept))
-        queues.insert(0 if starts % _MOTION_EVERY == _MOTION_EVERY - 1 else 2, ("moved", self._next_moved))
-        for name, queue in queues:
-            pair = queue()
+        for name in dict.fromkeys((_TURNS[self._started.total() % len(_TURNS)], *_QUEUES)):
+            pair = self._next(name, now_ns)
             if pair is not None:
                 return self._start(pair, name, now_ns)
         return None
@@ -190,6 +183,17 @@ class Agenda:
         robots = (self._roster[pair[0]], self._roster[pair[1]])
         moved = sum(_change(robot, pose) for robot, pose in zip(robots, plan.poses, strict=True))
         return moved + self._boundary(pair)
+
+    def _next(self, queue: str, now_ns: int) -> Pair | None:
+        match queue:
+            case "fresh":
+                return self._next_fresh()
+            case "regular":
+                return self._next_regular()
+            case "moved":
+                return self._next_moved()
+            case _:
+                return self._patrol.next(now_ns, self.partners)
 
     def _next_fresh(self) -> Pair | None:
         while self._fresh:

@@ -36,11 +36,11 @@ class StationOptions:
     """`capacity` is how many surveys, and how many extractions, may be under way at once.
 
     A robot is stale when silent for `live_after_s`, gone after `gone_after_s` more, forgotten `forget_after_s` after
-    its last sign of life. An answer about a pair is decayed, then unknown, so long after it was computed. A pair whose
-    views cannot meet, as far as known, is tried all the same every `retry_after_s`. A new keyframe's
-    first survey regroups within 20 ms; other surveys and poses do at most every `regroup_after_s`; both come later in
-    swarms of more than 100 and 500 robots, by .2 ms a robot. `revision` is the last one of the groups that was told
-    before this station started.
+    its last sign of life. An answer about a pair is decayed, then unknown, so long after it was computed. A pair
+    whose views cannot meet, as far as known, is tried all the same once in a while, and no sooner than after
+    `retry_after_s`: see `Patrol`. A new keyframe's first survey regroups within 20 ms; other surveys and poses do at
+    most every `regroup_after_s`; both come later in swarms of more than 100 and 500 robots, by .2 ms a robot.
+    `revision` is the last one of the groups that was told before this station started.
     """
 
     capacity: int = 2

@@ -287,3 +287,19 @@ def test_a_keyframe_whose_partner_is_busy_waits_for_it_and_holds_up_nobody() -> 
     later = jobs(scene.work([job]))
     assert [(job.first.sequence, job.second.sequence) for job in later[1:2]] == [(1, 0)]
     assert scene.snapshot.workload.waiting["fresh"] == 0
+
+
+def test_under_overload_every_queue_has_its_turns() -> None:
+    """Twelve robots that drive in two places, out of sight of each other, with hands for few of them."""
+    scene, under_way = Scene.of(capacity=1, retry_after_s=1.0), []
+    for step in range(160):
+        for number in range(step % 4, 12, 4):
+            scene.send(f"r{number:02}", pose(0.5 * (step // 4 % 6), BACK if number % 2 else AHEAD))
+        for job in under_way:
+            alike = int(job.first.robot[1:]) % 2 == int(job.second.robot[1:]) % 2
+            scene.done(job, measured() if alike else NOTHING)
+        under_way = jobs(scene.wait(0.25))
+    started = scene.snapshot.workload.started
+    assert sum(started.values()) >= 100
+    assert started["regular"] >= 0.2 * sum(started.values())
+    assert min(started[queue] for queue in ("fresh", "moved", "sweep")) >= 0.08 * sum(started.values())
