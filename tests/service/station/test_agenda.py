@@ -303,3 +303,17 @@ def test_under_overload_every_queue_has_its_turns() -> None:
     assert sum(started.values()) >= 100
     assert started["regular"] >= 0.2 * sum(started.values())
     assert min(started[queue] for queue in ("fresh", "moved", "sweep")) >= 0.08 * sum(started.values())
+
+
+def test_pairs_at_the_boundary_of_groups_are_surveyed_before_others() -> None:
+    """a1 and a2 are as good as one, b1 has something in common with both, and the far ones with nobody else."""
+    seen = {("a1", "a2"): 1.0, ("a1", "b1"): 0.5, ("a2", "b1"): 0.5, ("c1", "c2"): 1.0}
+    scene = Scene.of(capacity=1, retry_after_s=1e6)
+    places = {"a1": 0.0, "a2": 0.1, "b1": 0.9, "c1": 40.0, "c2": 40.1}
+    for robot, x_m in places.items():
+        scene.send(robot, pose(x_m))
+    scene.settle(lambda job: measured(*2 * [seen.get((job.first.robot, job.second.robot), 0.0)]))
+    boundary = scene.station._groups.boundary
+    assert boundary(("a1", "b1")) > max(boundary(("a1", "a2")), boundary(("a1", "c1")), boundary(("c1", "c2")))
+    assert all(0 <= boundary(pair) <= 1 for pair in combinations(sorted(places), 2))
+    assert boundary(("a1", "nobody")) == 0.0
