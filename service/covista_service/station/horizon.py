@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from statistics import median
+
+import numpy as np
 
 # So many robots must have told how far they may see.
 _ENOUGH = 8

@@ -14,7 +14,7 @@ from covista_service.station.options import NS_PER_S
 _KEYFRAMES = 16
 _PER_S = 6.0
 # What has been saved up is spent at once, up to so many.
-_MOST_SAVED = 8.0
+_MOST_SAVED = 16.0
 # Robots looked at for one pair. When all have been looked at in vain, it is not done again for so long.
 _ROBOTS = 8
 _VAIN_NS = NS_PER_S

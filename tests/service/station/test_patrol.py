@@ -68,7 +68,7 @@ def test_in_a_large_swarm_every_pair_has_its_turn_within_the_period_it_says(coun
 def test_tries_follow_keyframes_and_time_and_not_the_number_of_pairs(count: int) -> None:
     watch = Watch(count)
     tries = sum(watch.second() for _ in range(20))
-    assert tries <= 8 + 20 * (6 + count / 16)
+    assert tries <= 16 + 20 * (6 + count / 16)
     assert tries >= 18 * 6
 
 
