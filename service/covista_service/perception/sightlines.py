@@ -46,6 +46,19 @@ def in_cells(matrices: Floats, sizes: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 @compiled
+def ranges(inverse_depth: Floats) -> Floats:
+    """`range_of_row` of a gallery."""
+    found = np.empty((len(inverse_depth), ROWS, 2))
+    for k in range(len(inverse_depth)):
+        for r in range(ROWS):
+            least, most = inverse_depth[k, r, 0], inverse_depth[k, r, 0]
+            for c in range(1, COLUMNS):
+                least, most = min(least, inverse_depth[k, r, c]), max(most, inverse_depth[k, r, c])
+            found[k, r] = least, most
+    return found
+
+
+@compiled
 def look(
     pairs: NDArray[np.int64],
     rotations: Floats,
@@ -79,7 +92,7 @@ def look(
         mask[:] = False
         mine = clues[k] if weigh else nothing
         mine[:] = 0.0
-        _project(rotations[k], translations[k], cells_from_rays[j], rays_from_cells[i], forms)
+        project(rotations[k], translations[k], cells_from_rays[j], rays_from_cells[i], forms)
         edge_px = limits[3] * COLUMNS * cell_px[j, 0] if weigh else 0.0
         _widen(forms, edge_px / cell_px[j, 0], edge_px / cell_px[j, 1], wide)
         _frame(wide, range_of_row[i], spans)
@@ -109,7 +122,7 @@ def look(
 
 
 @compiled
-def _project(
+def project(
     rotation: Floats, translation: Floats, cells_from_rays: Floats, rays_from_cells: Floats, out: Floats
 ) -> None:
     """Five linear forms in (c, r, 1, inverse depth), all positive where a cell of the first lies in the second image.

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from covista_service.perception.camera import Camera, Floats
-from covista_service.perception.sightlines import in_cells, look
-from covista_service.perception.surface import COLUMNS, ROWS, Surface
+from covista_service.perception.sightlines import in_cells, look, ranges
+from covista_service.perception.surface import COLUMNS, ROWS, Surface, stacked
 
 Mask = NDArray[np.bool_]
 # Of keyframes that matches connect.
@@ -71,9 +71,8 @@ class Gallery:
         """Stack them; a pair names its two by their places in this order."""
         matrix = np.array([one.camera.matrix for one in seeings], np.float64).reshape(-1, 3, 3)
         size = np.array([(one.camera.width, one.camera.height) for one in seeings], np.float64).reshape(-1, 2)
-        depth = np.array([one.surface.inverse_depth for one in seeings], np.float64).reshape(-1, ROWS, COLUMNS)
-        sigma = np.array([one.surface.sigma for one in seeings], np.float64).reshape(-1, ROWS, COLUMNS)
-        return cls(*in_cells(matrix, size), depth, sigma, np.stack((depth.min(axis=2), depth.max(axis=2)), axis=-1))
+        depth, sigma = stacked([one.surface for one in seeings])
+        return cls(*in_cells(matrix, size), depth, sigma, ranges(depth))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

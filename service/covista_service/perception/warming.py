@@ -6,11 +6,13 @@ from functools import cache
 
 import numpy as np
 
-from covista_service.perception.camera import Camera, Features, Floats, Pose, View
+from covista_service.perception.camera import Camera, Features, Floats, Pose, View, relative
+from covista_service.perception.flow import flow
 from covista_service.perception.regions import RegionOptions, regions
 from covista_service.perception.scene import SceneOptions, reconstruct
 from covista_service.perception.surface import COLUMNS, ROWS
 from covista_service.perception.survey import SurveyOptions, survey
+from covista_service.perception.visibility import Seeing
 
 _CAMERA = Camera(np.array([[250.0, 0, 159.5], [0, 250.0, 119.5], [0, 0, 1]]), 320, 240)
 _STEP_M = 0.5
@@ -29,6 +31,9 @@ def warm_up() -> None:
     scene = reconstruct(views, pairs, SceneOptions())
     for pair in pairs:
         scene.overlap(*pair)
+    moved = relative(scene.poses[0], scene.poses[1])
+    seen = [Seeing(_CAMERA, surface) for surface in scene.surfaces[:1] if surface is not None]
+    flow(seen, moved[0][None], moved[1][None], [_CAMERA])
     regions(np.ones((ROWS, COLUMNS), np.bool_), _CAMERA, RegionOptions())
     survey(views[0], views[1], SurveyOptions())
 

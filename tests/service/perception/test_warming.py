@@ -6,10 +6,12 @@ _IMPORTS = """
 from dataclasses import replace
 import numpy as np
 from covista_service.perception.camera import Camera, Pose
+from covista_service.perception.flow import flow
 from covista_service.perception.regions import RegionOptions, regions
 from covista_service.perception.scene import SceneOptions, reconstruct
 from covista_service.perception.surface import COLUMNS, ROWS
 from covista_service.perception.survey import SurveyOptions, survey
+from covista_service.perception.visibility import Seeing
 from tests.service.perception.scenes import CAMERA, turn
 from tests.service.perception.swarms import moved, points_on_wall, side_by_side, views
 """
@@ -28,6 +30,8 @@ assert scene.poses[2] is not seen[2].pose
 assert all(scene.overlap(*pair) is not None for pair in pairs)
 regions(np.random.default_rng(0).random((ROWS, COLUMNS)) < 0.7, distorted, RegionOptions())
 survey(seen[0], seen[1], SurveyOptions())
+seeing = [Seeing(CAMERA, surface) for surface in scene.surfaces]
+flow(seeing, np.repeat(turn(0, 2, 0)[None], 4, axis=0), np.zeros((4, 3)), [CAMERA] * 4)
 """
 
 
