@@ -103,11 +103,22 @@ class Affinity:
         """Set a robot's position (3,) in metres; ValueError where it is not three finite numbers below 10^12."""
         self._put(self._slot[robot], _checked(robot, position_m))
 
-    def see(self, a: str, b: str, q_a: float | None, q_b: float | None, *, again: bool = False) -> float | None:
+    def see(
+        self,
+        a: str,
+        b: str,
+        q_a: float | None,
+        q_b: float | None,
+        *,
+        again: bool = False,
+        moved: bool = False,
+    ) -> float | None:
         """Set the share `q_a` of a's image that b sees, and `q_b` of b's that a sees; None where unknown.
 
-        `again`: the same two pictures as before, read anew. They take the place of the last reading. What comes of it
-        is their mutual overlap, smoothed. Raises ValueError for a robot and itself, and for a share that is none.
+        `again`: the same two pictures as before, read anew. They take the place of the last reading. `moved`: what has
+        changed since the last reading is where the two stand. That is known and not measured, so it is not smoothed.
+        What comes of it is their mutual overlap, smoothed. Raises ValueError for a robot and itself, and for a share
+        that is none.
         """
         i, j = self._slot[a], self._slot[b]
         if i == j:
@@ -122,10 +133,12 @@ class Affinity:
         mutual, held = (seen + seeing) / 2, self._mutual.item(i, j)
         # NaN in the one or the other: there is nothing to smooth.
         fresh = math.isnan(held + mutual)
-        if self._smoothing != 1 and not fresh and not (again and self._once[i, j]):
-            held += self._smoothing * (mutual - (former if again else held))
+        same = again or moved
+        if self._smoothing != 1 and not fresh and not (same and self._once[i, j]):
+            weight = 1.0 if moved else self._smoothing
+            held += weight * (mutual - (former if same else held))
             mutual = min(max(held, 0.0), 1.0)
-        self._once[i, j] = self._once[j, i] = fresh or (again and bool(self._once[i, j]))
+        self._once[i, j] = self._once[j, i] = fresh or (same and bool(self._once[i, j]))
         self._mutual[i, j] = self._mutual[j, i] = mutual
         return None if math.isnan(mutual) else mutual
 
