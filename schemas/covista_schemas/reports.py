@@ -127,6 +127,13 @@ class PairKeyframes(Report):
     b: KeyframeId
 
 
+class PairTimes(Report):
+    """When the two robots stood where an overlap is of, by their own clocks."""
+
+    a: Time
+    b: Time
+
+
 class PairSummary(Report):
     """The overlap of two robots' views; `overlap_a` is the share of a's image that b sees."""
 
@@ -142,6 +149,11 @@ class PairSummary(Report):
     pose_source: Literal["reported", "images"] | None
     age_s: float | None = Field(description="Seconds since the answer was computed.")
     keyframes: PairKeyframes | None
+    poses: PairTimes | None = Field(
+        default=None,
+        description="Sensor times of the poses that the overlap stands for: those of the keyframes, or newer ones "
+        "where a robot has moved since. Regions and planes are always those of the keyframes.",
+    )
 
 
 class PlaneReport(Report):

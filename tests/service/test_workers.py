@@ -19,7 +19,7 @@ from covista_service.perception.comparison import Outcome
 from covista_service.perception.scene import Evidence, Sight
 from covista_service.perception.warming import warm_up
 from covista_service.station.events import BuildSurfaces, Keyframe, KeyframeArrived, KeyframeId, SurveyPair
-from covista_service.station.outlooks import Outlook, masks
+from covista_service.station.outlook import Outlook, masks
 from covista_service.workers import Workers, WorkersOptions, extract
 
 from tests.service.deadline import wait_until

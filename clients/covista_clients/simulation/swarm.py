@@ -51,13 +51,14 @@ class KeyframeRecord:
     """A keyframe handed to its rover: its name, and the pose that its picture was rendered from.
 
     While a rover has no station, or is slow, a keyframe replaces the one that waits and takes over its name: of records
-    with one name the last one holds.
+    with one name the last one holds. `t_s`: when it was due, after the beginning.
     """
 
     robot: str
     boot: str
     sequence: int
     pose: Pose
+    t_s: float = 0.0
 
 
 @dataclass(slots=True)
@@ -185,4 +186,4 @@ def drive(
 
 def _keyframe(built: Swarm, sender: Sender, due: Due, pose: Pose) -> KeyframeRecord:
     sent = sender.send_keyframe(render(built.world, built.camera, pose).image, pose)
-    return KeyframeRecord(f"r{due.robot + 1}", sent.boot, sent.sequence, pose)
+    return KeyframeRecord(f"r{due.robot + 1}", sent.boot, sent.sequence, pose, due.t_s)

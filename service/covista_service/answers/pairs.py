@@ -15,7 +15,7 @@ from covista_service.perception.comparison import Comparison
 from covista_service.perception.regions import RegionOptions, regions
 from covista_service.perception.survey import Outcome, Plane, Survey, SurveyOptions, explain
 from covista_service.station.events import Keyframe
-from covista_service.station.outlooks import masks
+from covista_service.station.outlook import masks
 from covista_service.station.snapshot import PairView, Snapshot
 
 # Hundredths of a pixel are finer than any camera's model.
@@ -91,9 +91,13 @@ def common_regions(view: PairView) -> tuple[list[Floats], list[Floats]]:
 def _pair(view: PairView, first: Literal["a", "b"]) -> dict[str, object]:
     """The fields of a summary, with the robot that is to come first as `a`."""
     sure_a, sure_b = view.intervals or (None, None)
-    sides = [(view.a, view.overlap_a, sure_a, view.keyframe_a), (view.b, view.overlap_b, sure_b, view.keyframe_b)]
+    time_a, time_b = view.stands_for_ns or (None, None)
+    sides = [
+        (view.a, view.overlap_a, sure_a, view.keyframe_a, time_a),
+        (view.b, view.overlap_b, sure_b, view.keyframe_b, time_b),
+    ]
     one, other = sides if first == "a" else sides[::-1]
-    (a, overlap_a, interval_a, keyframe_a), (b, overlap_b, interval_b, keyframe_b) = one, other
+    (a, overlap_a, interval_a, keyframe_a, time_a), (b, overlap_b, interval_b, keyframe_b, time_b) = one, other
     return {
         "a": a,
         "b": b,
@@ -107,6 +111,7 @@ def _pair(view: PairView, first: Literal["a", "b"]) -> dict[str, object]:
         "pose_source": _pose_source(view),
         "age_s": view.age_s,
         "keyframes": _keyframes(keyframe_a, keyframe_b),
+        "poses": _times(time_a, time_b),
     }
 
 
@@ -119,6 +124,12 @@ def _pose_source(view: PairView) -> Literal["reported", "images"] | None:
 
 def _keyframes(a: Keyframe | None, b: Keyframe | None) -> reports.PairKeyframes | None:
     return reports.PairKeyframes(a=keyframe_id(a.id), b=keyframe_id(b.id)) if a and b else None
+
+
+def _times(a_ns: int | None, b_ns: int | None) -> reports.PairTimes | None:
+    if a_ns is None or b_ns is None:
+        return None
+    return reports.PairTimes(a=reports.time_of(a_ns), b=reports.time_of(b_ns))
 
 
 def _planes(view: PairView) -> list[reports.PlaneReport]:

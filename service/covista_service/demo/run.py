@@ -8,7 +8,7 @@ from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from covista_clients.simulation import swarm, worlds
+from covista_clients.simulation import swarm
 from covista_clients.simulation.swarm import KeyframeRecord, SwarmOptions
 from covista_schemas.errors import CovistaError
 from covista_schemas.reports import Group
@@ -103,8 +103,9 @@ def _warmed(watch: Watch, signals: Interruption, screen: Screen) -> None:
 
 
 def _accuracy(options: SwarmOptions) -> Accuracy:
-    world = worlds.build(options.world, options.seed, options.robots)
-    return Accuracy(rendered_overlap(world, swarm.camera(options)))
+    built = swarm.swarm(options)
+    index = {name: k for k, name in enumerate(swarm.names(options))}
+    return Accuracy(rendered_overlap(built.world, built.camera), lambda robot, t_s: built.paths.pose(index[robot], t_s))
 
 
 class Demo:
@@ -183,7 +184,7 @@ class Demo:
                 case KeyframeRecord() as record:
                     # Numbers have no gaps, and one that was replaced before it went out gave its own away.
                     self._last[record.robot] = record.sequence
-                    self._accuracy.sent(record.robot, record.boot, record.sequence, record.pose)
+                    self._accuracy.sent(record.robot, record.boot, record.sequence, record.pose, record.t_s)
                 case Summary() as summary:
                     self._summary = summary
                 case _:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterable
 from collections.abc import Set as AbstractSet
 
 import numpy as np
@@ -11,36 +12,67 @@ from covista_service.perception.scales import parts_of
 from covista_service.station.events import KeyframeId
 
 Names = tuple[KeyframeId, KeyframeId]
+Held = Callable[[KeyframeId], bool]
+# Only the nearest so many bear witness: who is farther away is not asked.
+NEAREST = 64
 
 
 class Agreements:
     """Which robots' reported poses the images of which others bear out."""
 
     def __init__(self) -> None:
-        self._agree: dict[tuple[str, str], tuple[Names, bool]] = {}
+        # What images say of two robots, by either.
+        self._said: dict[str, dict[str, tuple[Names, bool]]] = {}
 
     def note(self, first: KeyframeId, second: KeyframeId, *, agree: bool) -> None:
         """Enter whether the images of two robots agree with what the two have reported."""
-        self._agree[first.robot, second.robot] = ((first, second), agree)
+        for one, other in ((first, second), (second, first)):
+            self._said.setdefault(one.robot, {})[other.robot] = ((first, second), agree)
 
-    def borne_out(self, held: Callable[[KeyframeId], bool]) -> AbstractSet[str]:
-        """The largest set of robots that are connected by agreement: who contradicts them is taken to be wrong.
+    def borne_out(self, robots: Iterable[str], held: Held) -> AbstractSet[str]:
+        """Which of these robots belong to the largest set around them that is connected by agreement.
 
-        Nobody where no set is larger than all others. Only keyframes that are still `held` bear witness: a robot that
-        was right long ago may have lost its way.
+        Who contradicts that set is taken to be wrong; nobody is borne out where no set is larger than all others. A
+        robot's witnesses are those that images connect it with, whatever they say, the nearest first. Only keyframes
+        that are still `held` bear witness: a robot that was right long ago may have lost its way.
         """
-        said = {pair: agree for pair, (names, agree) in self._agree.items() if all(map(held, names))}
-        names = sorted({name for pair in said for name in pair})
-        index = {name: k for k, name in enumerate(names)}
-        parts = parts_of(len(names), [(index[a], index[b]) for (a, b), agree in said.items() if agree])
-        if not len(parts):
-            return frozenset()
-        sizes = np.bincount(parts)
-        largest = int(sizes.argmax())
-        if (sizes == sizes[largest]).sum() > 1:
-            return frozenset()
-        return frozenset(name for name, part in zip(names, parts.tolist(), strict=True) if part == largest)
+        asked, borne_out = dict.fromkeys(robots), set[str]()
+        while asked:
+            around = self._around(next(iter(asked)), held)
+            borne_out.update(self._largest(around, held) & asked.keys())
+            for robot in around:
+                asked.pop(robot, None)
+        return borne_out
 
     def forget(self, robot: str) -> None:
         """Drop a robot."""
-        self._agree = {pair: said for pair, said in self._agree.items() if robot not in pair}
+        for other in self._said.pop(robot, ()):
+            self._said[other].pop(robot)
+            if not self._said[other]:
+                del self._said[other]
+
+    def _around(self, robot: str, held: Held) -> list[str]:
+        found, ahead = {robot: None}, deque([robot])
+        while ahead:
+            for other, (names, _) in self._said.get(ahead.popleft(), {}).items():
+                if other not in found and all(map(held, names)):
+                    if len(found) == NEAREST:
+                        return list(found)
+                    found[other] = None
+                    ahead.append(other)
+        return list(found)
+
+    def _largest(self, robots: list[str], held: Held) -> set[str]:
+        index = {robot: k for k, robot in enumerate(robots)}
+        agreeing = [
+            (index[one], index[other])
+            for one in robots
+            for other, (names, agree) in self._said.get(one, {}).items()
+            if agree and other in index and all(map(held, names))
+        ]
+        parts = parts_of(len(robots), agreeing)
+        sizes = np.bincount(parts)
+        largest = int(sizes.argmax())
+        if (sizes == sizes[largest]).sum() > 1 or len(robots) == 1:
+            return set()
+        return {robot for robot, part in zip(robots, parts.tolist(), strict=True) if part == largest}

@@ -8,7 +8,7 @@ import numpy as np
 from covista_schemas.reports import EventKind
 
 from covista_service.station.events import Happened
-from covista_service.station.outlooks import Outlook
+from covista_service.station.outlook import Outlook
 
 # A keyframe's pose disagrees if it is off by so much: less is what images tell apart from nothing.
 _DEG, _SHARE = 0.5, 0.01

@@ -75,15 +75,18 @@ class Groups:
             self._affinity.remove(robot)
             self._news = True
 
-    def see(self, pair: Pair, overlaps: tuple[float, float] | None, *, again: bool = False) -> float | None:
+    def see(
+        self, pair: Pair, overlaps: tuple[float, float] | None, *, again: bool = False, moved: bool = False
+    ) -> float | None:
         """Set a pair's overlaps, None where unknown; what they have in common since, smoothed.
 
-        Nothing happens while one of the two takes no part. `again`: read anew from the same keyframes.
+        Nothing happens while one of the two takes no part. `again`: read anew from the same surfaces; `moved`: from
+        those for other poses.
         """
         if pair[0] not in self._affinity or pair[1] not in self._affinity:
             return None
         self._drift = True
-        return self._affinity.see(*pair, *(overlaps or (None, None)), again=again)
+        return self._affinity.see(*pair, *(overlaps or (None, None)), again=again, moved=moved)
 
     def see_row(self, robot: str, others: Iterable[str], overlap: float | None) -> None:
         """Set the overlaps of a robot and many others to one number, those that take part."""

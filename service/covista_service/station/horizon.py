@@ -30,7 +30,8 @@ class Horizon:
         self._news += 1
         if len(self._far_m) < _ENOUGH or (math.isfinite(self.farthest_m) and self._news * _SHARE < len(self._far_m)):
             return False
-        before, self.farthest_m, self._news = self.farthest_m, median(self._far_m.values()), 0
+        before, self._news = self.farthest_m, 0
+        self.farthest_m = float(np.median(list(self._far_m.values())))
         return math.isinf(before)
 
     def forget(self, robot: str) -> None:

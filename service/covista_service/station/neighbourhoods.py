@@ -15,7 +15,7 @@ from covista_service.station.grid import Grid
 from covista_service.station.groups import Groups
 from covista_service.station.horizon import Horizon
 from covista_service.station.options import StationOptions, nanoseconds
-from covista_service.station.outlooks import Outlook
+from covista_service.station.outlook import Outlook
 from covista_service.station.pairs import Answer, Judged, Pairs, apart, pair_of
 from covista_service.station.reach import Reach, depth_of, farthest_m
 from covista_service.station.roster import Robot, Roster

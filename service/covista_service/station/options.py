@@ -40,7 +40,8 @@ class StationOptions:
     whose views cannot meet, as far as known, is tried all the same once in a while, and no sooner than after
     `retry_after_s`: see `Patrol`. A new keyframe's first survey regroups within 20 ms; other surveys and poses do at
     most every `regroup_after_s`; both come later in swarms of more than 100 and 500 robots, by .2 ms a robot.
-    `revision` is the last one of the groups that was told before this station started.
+    Of robots that have moved, no more than `forecasts_per_s` ordered pairs are read anew from known surfaces; with 0
+    none are. `revision` is the last one of the groups that was told before this station started.
     """
 
     capacity: int = 2
@@ -51,6 +52,7 @@ class StationOptions:
     unknown_after_s: float = 600.0
     retry_after_s: float = 30.0
     regroup_after_s: float = 0.1
+    forecasts_per_s: float = 4000.0
     revision: int = 0
     grouping: GroupingOptions = GroupingOptions()
 

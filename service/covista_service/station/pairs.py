@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from heapq import heappop, heappush
 
 from covista_schemas.reports import FoundBy
 
+from covista_service.perception.camera import Pose
 from covista_service.perception.certainty import Interval
 from covista_service.perception.comparison import Comparison
 from covista_service.perception.visibility import SAME_SCALE
+from covista_service.station.ages import Ages
 from covista_service.station.events import Keyframe, KeyframeId, Pair
-from covista_service.station.outlooks import Outlook, Ratios
+from covista_service.station.outlook import Outlook, Ratios
 
 NOT_SURVEYED = "not_surveyed"
 FAILED = "failed"
@@ -22,8 +23,10 @@ FAILED = "failed"
 class Answer:
     """The overlap of a pair as last found, on which keyframes: `overlaps` are the shares of first's and second's.
 
-    `intervals` hold the true shares in nine cases of ten. `outlooks` are what it was read from, None if their views
-    cannot meet, and `ratios` those that the scales of their depths may have.
+    `intervals` hold the true shares in nine cases of ten. `outlooks` are those of the keyframes, None if their views
+    cannot meet, and `ratios` those that the scales of their depths may have. `poses` are those that it stands for, and
+    `times_ns` their sensor times; `sources` are the keyframes whose surfaces it rests on. Where it does not say, those
+    are the keyframes' own, and themselves. `matched`: the images of the sources share matched points.
     """
 
     overlaps: tuple[float, float]
@@ -34,18 +37,36 @@ class Answer:
     intervals: tuple[Interval, Interval] | None = None
     outlooks: tuple[Outlook, Outlook] | None = None
     ratios: Ratios = SAME_SCALE
+    poses: tuple[Pose, Pose] | None = None
+    times_ns: tuple[int, int] | None = None
+    sources: tuple[KeyframeId, KeyframeId] | None = None
+    matched: bool = False
 
     @property
     def keyframes(self) -> tuple[KeyframeId, KeyframeId]:
         """Which keyframes it is of."""
         return self.first.id, self.second.id
 
+    @property
+    def stands_for_ns(self) -> tuple[int, int]:
+        """Sensor times of the poses that it stands for."""
+        return self.times_ns or (self.first.time_ns, self.second.time_ns)
+
+    def stands_for(self, first: Pose, second: Pose) -> bool:
+        """Is it of these very poses?"""
+        return self.poses is not None and self.poses[0] is first and self.poses[1] is second
+
+    @property
+    def rests_on(self) -> tuple[KeyframeId, KeyframeId]:
+        """The keyframes whose surfaces it was read from."""
+        return self.sources or self.keyframes
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairRecord:
     """One pair: the answer in force, the last survey, what it came to, and the keyframes it was made on.
 
-    `expired` is an answer that has grown too old: read again from the same keyframes it does not come back.
+    `expired` is an answer that has grown too old: read again from the same surfaces it does not come back.
     """
 
     answer: Answer | None = None
@@ -57,7 +78,7 @@ class PairRecord:
     @property
     def measured(self) -> bool:
         """Does the answer rest on images?"""
-        return self.answer is not None and self.answer.found_by is FoundBy.IMAGE
+        return self.answer is not None and self.answer.matched
 
     @property
     def explained(self) -> bool:
@@ -75,7 +96,7 @@ def pair_of(a: str, b: str) -> Pair:
 
 
 class Pairs:
-    """Records of the pairs whose views may meet, and the order in which their answers grow too old.
+    """Records of the pairs whose views may meet, and when their answers grow too old.
 
     All others share nothing, and are so many that nothing is kept of them: see `apart`.
     """
@@ -84,9 +105,7 @@ class Pairs:
         self._unknown_after_ns = unknown_after_ns
         self._records: dict[Pair, PairRecord] = {}
         self._beside: dict[str, dict[str, None]] = {}
-        # When an answer may be too old, at the earliest, the next one first: one entry a pair.
-        self._ageing: list[tuple[int, Pair]] = []
-        self._timed: set[Pair] = set()
+        self._ages = Ages()
         self._copy: Mapping[Pair, PairRecord] | None = None
 
     def __getitem__(self, pair: Pair) -> PairRecord:
@@ -120,6 +139,8 @@ class Pairs:
         if record is None:
             return _NOTHING
         self._copy = None
+        if record.answer is not None:
+            self._ages.drop(pair, record.answer.computed_ns)
         for robot, other in (pair, pair[::-1]):
             del self._beside[robot][other]
             if not self._beside[robot]:
@@ -133,37 +154,34 @@ class Pairs:
         self._put(pair, replace(self[pair], compared=compared, outcome=outcome, surveyed=(first.id, second.id)))
 
     def enter(self, pair: Pair, answer: Answer) -> bool:
-        """Enter the overlap as read from what is known now; True if the last one was read from the same keyframes.
+        """Enter the overlap as read from what is known now; True if the last one was read from the same surfaces.
 
-        Read anew from the same keyframes an answer may be better, but it is no younger.
+        Read anew from the surfaces of the same keyframes, for newer poses too, an answer may be better, but it is no
+        younger.
         """
         record = self[pair]
-        again = record.answer is not None and record.answer.keyframes == answer.keyframes
+        held = record.answer
+        again = held is not None and held.rests_on == answer.rests_on
         if record.expired is not None and _same(record.expired, answer):
             return again
-        if record.answer is not None and _same(record.answer, answer):
-            self._put(pair, replace(record, answer=replace(answer, computed_ns=record.answer.computed_ns)))
+        if held is not None and _same(held, answer):
+            if answer.computed_ns != held.computed_ns:
+                answer = replace(answer, computed_ns=held.computed_ns)
+            self._put(pair, replace(record, answer=answer))
             return again
         self._put(pair, replace(record, answer=answer, expired=None))
-        self._time(pair, answer)
+        if held is not None:
+            self._ages.drop(pair, held.computed_ns)
+        self._ages.put(pair, answer.computed_ns)
         return again
 
     def expire(self, now_ns: int) -> list[Pair]:
         """Drop the answers that have become too old to stand for anything; the pairs that are unknown now."""
-        expired: list[Pair] = []
-        while self._ageing and now_ns - self._ageing[0][0] >= self._unknown_after_ns:
-            _, pair = heappop(self._ageing)
-            self._timed.discard(pair)
-            record = self[pair]
-            if record.answer is None:
-                continue
-            if now_ns - record.answer.computed_ns < self._unknown_after_ns:
-                # It has been answered anew since.
-                self._time(pair, record.answer)
-                continue
-            old = replace(record.answer, outlooks=None)
+        expired = self._ages.take(now_ns - self._unknown_after_ns)
+        for pair in expired:
+            record = self._records[pair]
+            old = None if record.answer is None else replace(record.answer, outlooks=None)
             self._put(pair, replace(record, answer=None, compared=None, expired=old))
-            expired.append(pair)
         return expired
 
     def forget(self, robot: str) -> None:
@@ -182,11 +200,6 @@ class Pairs:
         self._copy = None
         for robot, other in (pair, pair[::-1]):
             self._beside.setdefault(robot, {})[other] = None
-
-    def _time(self, pair: Pair, answer: Answer) -> None:
-        if pair not in self._timed:
-            self._timed.add(pair)
-            heappush(self._ageing, (answer.computed_ns, pair))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -207,5 +220,5 @@ def apart(first: Judged, second: Judged) -> Answer:
 
 
 def _same(held: Answer, answer: Answer) -> bool:
-    """Do two answers rest on the same keyframes in the same way?"""
-    return (held.keyframes, held.found_by) == (answer.keyframes, answer.found_by)
+    """Do two answers rest on the surfaces of the same keyframes in the same way?"""
+    return (held.rests_on, held.matched) == (answer.rests_on, answer.matched)

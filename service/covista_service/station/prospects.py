@@ -1,4 +1,4 @@
-"""What two keyframes have in common, by their outlooks."""
+"""What robots have in common, by what each has before it."""
 
 from __future__ import annotations
 
@@ -6,63 +6,71 @@ from collections.abc import Sequence
 
 import numpy as np
 from covista_schemas.reports import FoundBy
+from numpy.typing import NDArray
 
 from covista_service.perception.camera import relatives
 from covista_service.perception.certainty import CertaintyOptions, intervals
 from covista_service.perception.visibility import Gallery, Seeing, VisibilityOptions, looks
-from covista_service.station.outlooks import Outlook, Ratios
+from covista_service.station.outlook import Prospect, Ratios
 from covista_service.station.pairs import Answer
 
 
-def read(outlook: Outlook, others: Sequence[tuple[Outlook, Ratios]], now_ns: int) -> list[Answer]:
-    """The overlap of an outlook with each of others, the smaller id first; by image where keyframes share matches.
+def read(
+    prospects: Sequence[Prospect], pairs: NDArray[np.integer], ratios: Sequence[Ratios], computed_ns: Sequence[int]
+) -> list[Answer]:
+    """The overlaps of pairs (n, 2) of prospects, the smaller id first; by image where keyframes share matches.
 
-    `others` come with the ratios that their scales may have to the outlook's own.
+    Each comes with the ratios that the scales of the two may have, and with the time that its answer is to be of.
     """
-    if not others:
+    if not len(pairs):
         return []
-    outlooks = [outlook, *(other for other, _ in others)]
-    gallery = Gallery.of([Seeing(one.keyframe.camera, one.surface) for one in outlooks])
-    beside = np.arange(1, len(outlooks))
-    pairs = np.concatenate((np.column_stack((0 * beside, beside)), np.column_stack((beside, 0 * beside))))
-    forth = np.array([ratios for _, ratios in others])
+    gallery = Gallery.of([Seeing(one.outlook.keyframe.camera, one.surface) for one in prospects])
+    both = np.concatenate((pairs, pairs[:, ::-1]))
+    forth = np.array(ratios, np.float64)
     said = looks(
         gallery,
-        pairs,
-        *relatives([one.pose for one in outlooks], pairs),
+        both,
+        *relatives([one.pose for one in prospects], both),
         np.concatenate((forth, 1 / forth[:, ::-1])),
         VisibilityOptions(),
     )
-    matched = np.array([_matched(outlook, other) for other, _ in others])
-    sure = intervals(said.shares, said.clues, np.tile(matched, 2), CertaintyOptions())
+    couples = [(prospects[i], prospects[j]) for i, j in pairs.tolist()]
+    shared = [_matched(*couple) for couple in couples]
+    by_image = [are and one.still and other.still for are, (one, other) in zip(shared, couples, strict=True)]
+    sure = intervals(said.shares, said.clues, np.tile(by_image, 2), CertaintyOptions())
     shares, sure = said.shares.reshape(2, -1).T, sure.reshape(2, -1, 2).transpose(1, 0, 2)
     return [
-        _answer((outlook, other), shares[k].tolist(), sure[k].tolist(), bool(matched[k]), ratios, now_ns)
-        for k, (other, ratios) in enumerate(others)
+        _answer(*told)
+        for told in zip(couples, shares.tolist(), sure.tolist(), shared, by_image, ratios, computed_ns, strict=True)
     ]
 
 
-def _matched(first: Outlook, second: Outlook) -> bool:
-    return second.keyframe.id in first.matched or first.keyframe.id in second.matched
+def _matched(first: Prospect, second: Prospect) -> bool:
+    one, other = first.source, second.source
+    return other.keyframe.id in one.matched or one.keyframe.id in other.matched
 
 
 def _answer(
-    outlooks: tuple[Outlook, Outlook],
+    couple: tuple[Prospect, Prospect],
     shares: list[float],
     sure: list[list[float]],
     matched: bool,
+    by_image: bool,
     ratios: Ratios,
-    now_ns: int,
+    computed_ns: int,
 ) -> Answer:
-    order = (0, 1) if outlooks[0].keyframe.id.robot < outlooks[1].keyframe.id.robot else (1, 0)
-    first, second = outlooks[order[0]], outlooks[order[1]]
+    first, second = couple
     return Answer(
-        (shares[order[0]], shares[order[1]]),
-        FoundBy.IMAGE if matched else FoundBy.PREDICTED,
-        now_ns,
-        first.keyframe,
-        second.keyframe,
-        ((sure[order[0]][0], sure[order[0]][1]), (sure[order[1]][0], sure[order[1]][1])),
-        (first, second),
-        ratios if order[0] == 0 else (1 / ratios[1], 1 / ratios[0]),
+        (shares[0], shares[1]),
+        FoundBy.IMAGE if by_image else FoundBy.PREDICTED,
+        computed_ns,
+        first.outlook.keyframe,
+        second.outlook.keyframe,
+        ((sure[0][0], sure[0][1]), (sure[1][0], sure[1][1])),
+        (first.outlook, second.outlook),
+        ratios,
+        (first.pose, second.pose),
+        (first.time_ns, second.time_ns),
+        (first.source.keyframe.id, second.source.keyframe.id),
+        matched,
     )

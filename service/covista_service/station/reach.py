@@ -9,7 +9,7 @@ from covista_service.perception.extent import Box, Doubt, box_of
 from covista_service.perception.frustum import Frustum
 from covista_service.station.corrections import Correction
 from covista_service.station.events import Keyframe, KeyframeId
-from covista_service.station.outlooks import Outlook
+from covista_service.station.outlook import Outlook
 
 _LEAST_POINTS = 8
 # Matched points show the textured part of a scene only: nearer and farther surfaces may be there.

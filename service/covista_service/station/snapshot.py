@@ -19,7 +19,7 @@ from covista_service.station.corrections import Correction
 from covista_service.station.events import Keyframe, KeyframeId, Pair
 from covista_service.station.ledger import Counts
 from covista_service.station.options import NS_PER_S, GroupingOptions
-from covista_service.station.outlooks import Outlook, Ratios
+from covista_service.station.outlook import Outlook, Ratios
 from covista_service.station.pairs import Answer, Judged, PairRecord, apart, pair_of
 from covista_service.station.roster import Fix
 from covista_service.station.workload import Workload
@@ -57,7 +57,8 @@ class PairView:
     """One pair, a < b. The keyframes are those that the overlaps were computed on.
 
     `compared` is what the last survey found, its first image being a's; planes that it can tell explain the overlaps
-    if it is of the same keyframes (`explained`). `outlooks` are what the overlaps were read from.
+    if it is of the same keyframes (`explained`). `outlooks` are those of the keyframes, and `stands_for_ns` the sensor
+    times of the poses that the overlaps stand for: later ones, for robots that have moved since.
     """
 
     a: str
@@ -74,6 +75,7 @@ class PairView:
     intervals: tuple[Interval, Interval] | None = None
     outlooks: tuple[Outlook, Outlook] | None = None
     ratios: Ratios = SAME_SCALE
+    stands_for_ns: tuple[int, int] | None = None
 
     @property
     def inliers(self) -> int:
@@ -174,6 +176,7 @@ class Snapshot:
             answer.intervals,
             answer.outlooks,
             answer.ratios,
+            answer.stands_for_ns,
         )
 
     def _apart(self, a: str, b: str) -> Answer | None:

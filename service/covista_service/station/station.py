@@ -30,12 +30,13 @@ from covista_service.station.events import (
     TokenSeen,
 )
 from covista_service.station.extraction import Extractions
+from covista_service.station.forecasts import Read
 from covista_service.station.groups import Groups, Ungrouped
 from covista_service.station.options import NS_PER_S, GroupingOptions, StationOptions, nanoseconds
 from covista_service.station.pairs import Pairs
 from covista_service.station.roster import Robot, Roster
 from covista_service.station.snapshot import RobotView, Snapshot
-from covista_service.station.surveys import Read, Surveys
+from covista_service.station.surveys import Surveys
 from covista_service.station.workload import Workload
 
 # A clock further off than this is worth a look.
@@ -52,7 +53,7 @@ class Station:
     """
 
     def __init__(self, options: StationOptions | None = None, read: Read = prospects.read) -> None:
-        """`read` tells the overlap of two outlooks."""
+        """`read` tells the overlaps of pairs of prospects."""
         self.options = options or StationOptions()
         self._unknown_after_ns = nanoseconds(self.options.unknown_after_s)
         self._roster = Roster(self.options)
@@ -95,7 +96,7 @@ class Station:
     @property
     def waits(self) -> bool:
         """Is there news that the next evaluation waits for, and that should not wait for the next event?"""
-        return self._surveys.news
+        return self._surveys.news or self._surveys.forecasts.waiting > 0
 
     def resize(self, capacity: int) -> None:
         """So many extractions, and so many surveys and surfaces, may be under way at once from now on.
@@ -236,8 +237,10 @@ class Station:
 
     def _locate(self, robot: Robot, pose: Pose, time_ns: int, boot: str) -> bool:
         newest = robot.locate(pose, time_ns, boot)
-        if newest and robot.status is not Status.GONE:
-            self._place(robot)
+        if newest:
+            self._surveys.forecasts.moved(robot.id)
+            if robot.status is not Status.GONE:
+                self._place(robot)
         return newest
 
     def _place(self, robot: Robot) -> None:
@@ -261,8 +264,9 @@ class Station:
             self._views.pop(robot, None)
         effects += self._extract()
         effects += self._surveys.start(now_ns)
+        looked = self._surveys.forecasts.look(now_ns)
         effects += self._regroup(now_ns)
-        if effects or expired or lapsed or judged:
+        if effects or expired or lapsed or judged or looked:
             self._snapshot = None
         return effects
 

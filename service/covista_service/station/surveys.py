@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from covista_schemas.reports import EventKind
 
@@ -19,16 +19,15 @@ from covista_service.station.events import (
     SurveyDone,
     SurveyPair,
 )
+from covista_service.station.forecasts import Forecasts, Read
 from covista_service.station.groups import Groups
 from covista_service.station.neighbourhoods import Neighbourhoods
 from covista_service.station.options import StationOptions
-from covista_service.station.outlooks import Outlook, Outlooks, Ratios, view_of
-from covista_service.station.pairs import Answer, Pairs
+from covista_service.station.outlook import view_of
+from covista_service.station.outlooks import Outlooks
+from covista_service.station.pairs import Pairs
 from covista_service.station.roster import Robot, Roster
 from covista_service.station.workload import Workload
-
-# The overlap of an outlook with each of others, as `prospects.read` tells it.
-Read = Callable[[Outlook, Sequence[tuple[Outlook, Ratios]], int], list[Answer]]
 
 
 class Surveys:
@@ -41,9 +40,10 @@ class Surveys:
         self._pairs = pairs
         self._groups = groups
         self._capacity = options.capacity
-        self._overlaps_of = read
         self._agenda = Agenda(roster, pairs, options, groups.boundary)
         self._outlooks = Outlooks()
+        partners = self._agenda.partners
+        self.forecasts = Forecasts(roster, pairs, groups, self._outlooks, partners, options, read)
         self._corrections = Corrections()
         self.neighbourhoods = Neighbourhoods(roster, pairs, groups, self._agenda, self._corrections, options)
         # Arrivals of keyframes whose first survey no surface has been built with yet; those of them that a survey has
@@ -53,7 +53,7 @@ class Surveys:
         self._seen: list[tuple[KeyframeId, int]] = []
 
     def keyframe(self, robot: Robot, keyframe: Keyframe) -> None:
-        """Use a robot's new keyframe. What is known of its pairs stands until it has a surface of its own."""
+        """Use a robot's new keyframe. Until it has a surface of its own it is answered for by the last one's."""
         robot.keyframe = keyframe
         unseen = self._unseen.pop(robot.id, {})
         kept = [name for name in unseen if self._agenda.under_way(name) or self._outlooks.building(name)]
@@ -61,6 +61,7 @@ class Surveys:
         self._unseen[robot.id] = {**{name: unseen[name] for name in kept}, keyframe.id: keyframe.arrived_ns}
         self.neighbourhoods.note(robot.id)
         earlier = self._outlooks.keyframe(keyframe)
+        self.forecasts.moved(robot.id)
         self._agenda.fresh(robot.id)
         self._agenda.moved(robot.id, earlier)
 
@@ -89,7 +90,8 @@ class Surveys:
 
     def workload(self) -> Workload:
         """What waits and what was done."""
-        return self._agenda.workload()
+        forecasts = self.forecasts
+        return replace(self._agenda.workload(), forecasts=forecasts.count, forecasts_waiting=forecasts.waiting)
 
     def correction(self, robot: str) -> Correction | None:
         """How far a robot's reported pose is off, None while nothing is known of it."""
@@ -111,6 +113,7 @@ class Surveys:
         self._agenda.forget(robot)
         self._pairs.forget(robot)
         self._outlooks.forget(robot)
+        self.forecasts.forget(robot)
         self._corrections.forget(robot)
         self._compared.difference_update(self._unseen.pop(robot, {}))
 
@@ -136,15 +139,19 @@ class Surveys:
     def _built(self, event: SurfacesBuilt, now_ns: int) -> list[Happened]:
         """All overlaps that new surfaces have part in are read anew."""
         happened: list[Happened] = []
+        renewed: dict[str, None] = {}
         before = {name.robot: self._outlooks[name.robot] for name in event.job.keyframes}
-        for keyframe in self._outlooks.built(event):
+        built = self._outlooks.built(event, now_ns)
+        for keyframe in built:
             robot, held = self._roster[keyframe.id.robot], before[keyframe.id.robot]
             outlook = self._outlooks[robot.id]
             if outlook is not None:
                 again = held is not None and held.keyframe.id == keyframe.id
                 happened += self._corrections.note(outlook, now_ns, again=again)
                 self.neighbourhoods.deepen(robot, outlook)
-                self._read(outlook, now_ns)
+                renewed[robot.id] = None
+        self.forecasts.renewed(list(renewed), now_ns)
+        for keyframe in built:
             self._note(keyframe.id)
         if event.settled is None:
             opened = [name for name, sight in zip(event.job.keyframes, event.job.sights, strict=True) if sight.open]
@@ -156,16 +163,6 @@ class Surveys:
     def _survey(self, first: Keyframe, second: Keyframe) -> SurveyPair:
         one, other = (view_of(keyframe, self._outlooks.pose(keyframe)) for keyframe in (first, second))
         return SurveyPair(first.id, second.id, one, other)
-
-    def _read(self, outlook: Outlook, now_ns: int) -> None:
-        """Read the overlaps of a robot's outlook with those of all whose views may meet its own."""
-        robot, scales = outlook.keyframe.id.robot, self._outlooks.scales()
-        beside = [self._outlooks[other] for other in sorted(self._agenda.partners(robot))]
-        others = [(other, scales.ratios(robot, other.keyframe.id.robot)) for other in beside if other is not None]
-        for answer in self._overlaps_of(outlook, others, now_ns):
-            pair = (answer.first.id.robot, answer.second.id.robot)
-            again = self._pairs.enter(pair, answer)
-            self._groups.see(pair, self._pairs.overlaps(pair), again=again)
 
     def _note(self, keyframe: KeyframeId) -> None:
         if keyframe in self._compared:

@@ -27,10 +27,10 @@ def answer(overlap_a: float | None, overlap_b: float | None, keyframes: tuple[in
 
 @pytest.fixture
 def accuracy() -> Accuracy:
-    judge = Accuracy(nearness)
+    judge = Accuracy(nearness, lambda robot, t_s: pose(0.0 if robot == "r1" else t_s / 10))
     for sequence, (x1, x2) in enumerate([(0.0, 0.5), (0.0, 0.95), (0.0, 0.2)]):
-        judge.sent("r1", "x", sequence, pose(x1))
-        judge.sent("r2", "x", sequence, pose(x2))
+        judge.sent("r1", "x", sequence, pose(x1), sequence)
+        judge.sent("r2", "x", sequence, pose(x2), sequence)
     return judge
 
 

@@ -32,7 +32,7 @@ from covista_service.station.events import (
     Tick,
 )
 from covista_service.station.options import StationOptions
-from covista_service.station.outlooks import Outlook, Ratios
+from covista_service.station.outlook import Prospect, Ratios
 from covista_service.station.pairs import Answer
 from covista_service.station.snapshot import Snapshot
 from covista_service.station.station import Station
@@ -195,8 +195,14 @@ class Scene:
             self.shares[pair] = found.shares
         return self.receive(SurveyDone(job.first, job.second, None if found is None else found.comparison))
 
-    def _read(self, outlook: Outlook, others: Sequence[tuple[Outlook, Ratios]], now_ns: int) -> list[Answer]:
-        answers = prospects.read(outlook, others, now_ns)
+    def _read(
+        self,
+        seen: Sequence[Prospect],
+        pairs: np.ndarray,
+        ratios: Sequence[Ratios],
+        computed_ns: Sequence[int],
+    ) -> list[Answer]:
+        answers = prospects.read(seen, pairs, ratios, computed_ns)
         shares = [self.shares.get((answer.first.id.robot, answer.second.id.robot)) for answer in answers]
         return [
             answer if said is None else replace(answer, overlaps=said)

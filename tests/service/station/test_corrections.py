@@ -5,7 +5,7 @@ import pytest
 from covista_service.perception.camera import Pose
 from covista_service.perception.surface import flat
 from covista_service.station.corrections import Corrections
-from covista_service.station.outlooks import Outlook
+from covista_service.station.outlook import Outlook
 
 from tests.service.perception.scenes import turn
 from tests.service.station.scenes import Scene, pose

@@ -9,7 +9,7 @@ from covista_schemas.reports import FoundBy
 from covista_service.perception.camera import Pose
 from covista_service.perception.surface import flat
 from covista_service.station.horizon import Horizon
-from covista_service.station.outlooks import Outlook
+from covista_service.station.outlook import Outlook
 from covista_service.station.pairs import pair_of
 from covista_service.station.station import Station
 from hypothesis import given, settings

@@ -64,13 +64,14 @@ def test_an_unknown_robot_makes_no_pair() -> None:
         pair(two_robots(), "r1", "r9")
 
 
-def test_a_new_keyframe_keeps_the_answer_until_it_is_surveyed() -> None:
+def test_a_new_keyframe_inherits_the_answer_until_it_is_surveyed() -> None:
     scene = two_robots(lambda job: measured(0.3, 0.7))
     scene.wait(1)
     scene.send("r1", pose(0.5))
     effects = scene.tick()
     assert surveys(effects) == [("r1", "r2")]
-    assert (pair(scene).overlap_a, names(pair(scene)), pair(scene).age_s) == (0.3, (0, 0), 1.0)
+    view = pair(scene)
+    assert (view.overlap_a, names(view), view.age_s, view.found_by) == (0.3, (1, 0), 1.0, FoundBy.PREDICTED)
     scene.work(effects, lambda job: measured(0.4, 0.8))
     assert (pair(scene).overlap_a, names(pair(scene)), pair(scene).age_s) == (0.4, (1, 0), 0.0)
 

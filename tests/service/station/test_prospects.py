@@ -4,7 +4,7 @@ import numpy as np
 from covista_service.perception.camera import Pose
 from covista_service.perception.surface import flat
 from covista_service.station.events import Keyframe
-from covista_service.station.outlooks import Outlook
+from covista_service.station.outlook import Outlook
 from covista_service.station.reach import Reach, depth_of
 
 from tests.service.station.scenes import AHEAD, BACK, NOTHING, Scene, measured, pose, surveys
