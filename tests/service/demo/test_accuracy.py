@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 from covista_clients.simulation import worlds
 from covista_schemas.messages import Camera, Pose
-from covista_schemas.reports import FoundBy, KeyframeId, PairKeyframes, PairSummary
+from covista_schemas.reports import FoundBy, KeyframeId, PairKeyframes, PairSummary, PairTimes, time_of
 from covista_service.demo.accuracy import Accuracy, rendered_overlap
 
 
@@ -40,6 +40,24 @@ def test_answers_are_judged_by_the_keyframes_that_they_name(accuracy: Accuracy) 
     accuracy.judge(answer(0.05, 0.05, (1, 1)))
     assert accuracy.error.count == 4
     assert accuracy.error_seen.count == 2
+
+
+def at(seconds_a: float, seconds_b: float) -> PairTimes:
+    return PairTimes(a=time_of(round(seconds_a * 1e9)), b=time_of(round(seconds_b * 1e9)))
+
+
+def test_an_answer_for_newer_poses_is_judged_where_robots_stood_then() -> None:
+    """r1 does not move; r2 drives a metre in ten seconds, and its clock is five seconds ahead of the swarm's."""
+    judge = Accuracy(nearness, lambda robot, t_s: pose(0.0 if robot == "r1" else t_s / 10))
+    judge.sent("r1", "x", 0, Pose((0.0, 0.0, 0.0), time_ns=2_000_000_000), 2.0)
+    judge.sent("r2", "x", 0, Pose((0.2, 0.0, 0.0), time_ns=7_000_000_000), 2.0)
+    judge.judge(answer(0.8, 0.8, (0, 0)))
+    judge.judge(answer(0.8, 0.8, (0, 0)).model_copy(update={"poses": at(2, 7)}))
+    assert judge.error.value == pytest.approx(0)
+    judge.judge(answer(0.5, 0.5, (0, 0)).model_copy(update={"poses": at(2, 10)}))
+    assert judge.error.value == pytest.approx(0)
+    judge.judge(answer(0.8, 0.8, (0, 0)).model_copy(update={"poses": at(2, 10)}))
+    assert judge.error.value == pytest.approx(2 * 0.3 / 8)
 
 
 def test_no_answer_counts_as_nothing_in_common(accuracy: Accuracy) -> None:
