@@ -12,6 +12,7 @@ from covista_service.bench import (
     latency,
     planes,
     predict_planes,
+    predict_poses,
     predict_surfaces,
     surface,
     survey,
@@ -23,7 +24,7 @@ Bench = Callable[[bool], Iterator[Row]]
 BENCHES: Mapping[str, Sequence[Bench]] = {
     "survey": (survey.rows, surface.rows, dense.rows),
     "planes": (planes.rows,),
-    "predict": (predict_planes.rows, predict_surfaces.rows),
+    "predict": (predict_planes.rows, predict_surfaces.rows, predict_poses.rows),
     "group": (group.rows, group_costs.rows),
     "latency": (latency.rows,),
 }
