@@ -18,8 +18,8 @@ from covista_service.perception.surface import COLUMNS, ROWS, Surface, stacked
 from covista_service.perception.visibility import Seeing
 
 _AHEAD = 1e-9
-# A second step is taken where the first changes the guess by more than this share.
-_STEPS, _SETTLED = 2, 0.01
+# A second step is taken where the first has moved the place in the old image by more than so much of a cell.
+_STEPS, _SETTLED = 2, 0.1
 # A surface is extended by so many times the inverse depth of a plane parallel to the image, and not into itself.
 _LEAST, _MOST, _STEEPEST = 0.2, 5.0, 0.8
 # So many cells beyond the old image, its border still tells what is there.
@@ -95,9 +95,9 @@ def _seek(forms: Floats, rho: Floats, sigma: Floats, depth: Floats, doubt: Float
             depth[r, c] = here
             if here > 0:
                 some, beside = True, here
-                far = min(np.hypot(u - c - 0.5, v - r - 0.5) / _FAR, 1.0)
+                way = (u - c - 0.5) * (u - c - 0.5) + (v - r - 0.5) * (v - r - 0.5)
                 i, j = min(max(int(v), 0), ROWS - 1), min(max(int(u), 0), COLUMNS - 1)
-                doubt[r, c] = _less_sure(sigma[i, j], _DOUBT * far)
+                doubt[r, c] = _less_sure(sigma[i, j], _DOUBT * min(np.sqrt(way) / _FAR, 1.0))
     return some
 
 
@@ -125,9 +125,10 @@ def _met(forms: Floats, u0: float, v0: float, w0: float, guess: float, rho: Floa
         met = (level * w0 + across * u0 + down * v0) / (1 - steep) if steep < _STEEPEST else parallel
         if not _LEAST * parallel < met < _MOST * parallel:
             met = parallel
-        settled = abs(met - guess) <= _SETTLED * met
+        off = abs(forms[0, 3] - u * forms[2, 3]) + abs(forms[1, 3] - v * forms[2, 3])
+        off *= nearness * abs(met - guess)
         guess = met
-        if settled:
+        if off < _SETTLED:
             break
     if max(max(-u, u - COLUMNS), max(-v, v - ROWS)) > _MARGIN:
         return 0.0, u, v

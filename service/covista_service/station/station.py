@@ -95,7 +95,7 @@ class Station:
 
     @property
     def waits(self) -> bool:
-        """Is there news that the next evaluation waits for, and that should not wait for the next event?"""
+        """Is there news, of a survey or of poses, that should not wait for the next event?"""
         return self._surveys.news or self._surveys.forecasts.waiting > 0
 
     def resize(self, capacity: int) -> None:
