@@ -204,7 +204,7 @@ class Forecasts:
         there = dict(zip((one.robot for one in away), surfaces[len(heirs) :], strict=True))
         for one in seen:
             self._prospects[one.robot] = one.prospect(there.get(one.robot))
-            if one.robot not in whole:
+            if one.robot not in whole and self._allowed:
                 turn = self._waiting.setdefault(one.robot, _Turn())
                 turn.again = turn.rest is not None
 
