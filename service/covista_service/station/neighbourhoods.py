@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import islice
+
+import numpy as np
 
 from covista_service.perception.camera import Pose
 from covista_service.perception.comparison import Outcome
@@ -22,6 +25,10 @@ from covista_service.station.roster import Robot, Roster
 
 # A smoothed overlap that has come down so far need not be told any more zeros.
 _NEGLIGIBLE = 1e-4
+# While views are endless, anybody may see the same as anybody: this many of the nearest are enough to begin with.
+_CROWD = 32
+# When views are endless no longer, so many are judged anew at a time beside those with news.
+_AT_ONCE = 16
 
 
 class Neighbourhoods:
@@ -29,6 +36,9 @@ class Neighbourhoods:
 
     Who is no partner shares nothing: of such a pair nothing is kept but when its two robots were judged, and a row of
     zeros in the groups. So a keyframe costs what its neighbours cost, whatever the size of the swarm.
+
+    Of those whom it may meet for no other reason than that a view is endless a robot takes the nearest 32; the others
+    are left to the sweep, until depths are known.
     """
 
     def __init__(
@@ -47,6 +57,7 @@ class Neighbourhoods:
         self._corrections = corrections
         self._unknown_after_ns = nanoseconds(options.unknown_after_s)
         self._to_judge: dict[str, None] = {}
+        self._later: dict[str, None] = {}
         self._reaches: dict[str, Reach] = {}
         self._grid = Grid()
         self._horizon = Horizon()
@@ -76,12 +87,13 @@ class Neighbourhoods:
             return
         robot.depth = depth
         if self._horizon.note(robot.id, farthest_m(depth)):
-            for name, reach in self._reaches.items():
-                if reach.endless:
-                    self.note(name)
+            self._later |= {name: None for name, reach in self._reaches.items() if reach.endless}
 
     def judge(self, now_ns: int) -> list[str]:
         """Judge the pairs of all robots with a new keyframe or depth; who they are."""
+        for name in list(islice(self._later, _AT_ONCE)):
+            del self._later[name]
+            self.note(name)
         robots = [self._roster[robot] for robot in self._to_judge]
         self._to_judge.clear()
         judged = [(robot, robot.keyframe) for robot in robots if robot.keyframe is not None]
@@ -134,6 +146,7 @@ class Neighbourhoods:
     def forget(self, robot: str) -> None:
         """Drop a robot."""
         self._to_judge.pop(robot, None)
+        self._later.pop(robot, None)
         self._reaches.pop(robot, None)
         self._grid.remove(robot)
         self._horizon.forget(robot)
@@ -152,10 +165,28 @@ class Neighbourhoods:
 
     def _meeting(self, robot: str, reach: Reach) -> list[str]:
         near = [other for other in self._grid.meeting(reach.box) if other != robot]
+        vague = near if reach.endless else [other for other in near if self._reaches[other].endless]
+        if len(vague) <= _CROWD:
+            return self._met(reach, near)
+        partners = self._agenda.partners(robot)
+        known = self._met(
+            reach, [other for other in near if other in partners or not (reach.endless or self._reaches[other].endless)]
+        )
+        nearest = self._by_distance(reach, [other for other in vague if other not in partners])
+        # A view is endless to one side: among so many of the nearest there are as a rule enough.
+        return known + self._met(reach, nearest[: 4 * _CROWD])[: max(0, _CROWD - len(known))]
+
+    def _met(self, reach: Reach, near: Sequence[str]) -> list[str]:
+        """Who of those near it a view may meet, by the faces of the frusta."""
         if not near:
             return []
         meet = Frusta([self._reaches[other].frustum for other in near]).may_meet(reach.frustum)
         return [other for other, met in zip(near, meet.tolist(), strict=True) if met]
+
+    def _by_distance(self, reach: Reach, others: Sequence[str]) -> list[str]:
+        centres_m = np.array([self._reaches[other].keyframe.pose.centre_m for other in others]).reshape(-1, 3)
+        order = np.linalg.norm(centres_m - reach.keyframe.pose.centre_m, axis=1).argsort(kind="stable")
+        return [others[k] for k in order.tolist()]
 
     def _judge(self, robot: Robot, keyframe: Keyframe, now_ns: int) -> None:
         name, former = robot.id, self._judged.get(robot.id)
