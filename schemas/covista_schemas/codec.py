@@ -82,6 +82,29 @@ def encode_keyframe(keyframe: Keyframe) -> bytes:
     return message.SerializeToString()
 
 
+def encode_picture(camera: Camera, features: Features, thumbnail: bytes | None = None) -> bytes:
+    """What stays the same of keyframes that show the same, for `encode_taken`."""
+    return pb.Keyframe(
+        camera=_encode_camera(camera), features=_encode_features(features, thumbnail)
+    ).SerializeToString()
+
+
+def encode_taken(update: PoseUpdate, picture: bytes) -> bytes:
+    """Bytes of a keyframe with its name and pose from `update`, and a picture that `encode_picture` has encoded.
+
+    Fields of a message may stand in any order, so that the two parts in a row are the message.
+    """
+    name = pb.Keyframe(
+        robot=update.robot,
+        boot=update.boot,
+        sequence=update.sequence,
+        time_ns=update.pose.time_ns,
+        world_from_camera=_encode_transform(update.pose),
+        covariance=update.pose.covariance,
+    )
+    return name.SerializeToString() + picture
+
+
 def encode_pose(update: PoseUpdate) -> bytes:
     """Bytes of a pose, `covista.v1.Pose`."""
     return pb.Pose(

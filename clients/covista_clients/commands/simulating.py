@@ -7,6 +7,8 @@ import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,6 +24,7 @@ from covista_clients.rover import Send
 if TYPE_CHECKING:
     from covista_clients.simulation.swarm import Progress, SwarmOptions
 
+CROWD_POSE_RATE_HZ = 1.0
 WorldName = Annotated[str, typer.Option("--world", help="corner, boxes, shelf, wall or arena.")]
 
 
@@ -33,19 +36,32 @@ def swarm(
     connect: Connect = DEFAULT_CONNECT,
     site: Site = "default",
     send: Annotated[Send, typer.Option(help="What the rovers make of their pictures.")] = Send.IMAGE,
-    seconds: Annotated[float | None, typer.Option(min=0, help="End after so many seconds.")] = None,
+    pose_rate: Annotated[
+        float | None, typer.Option(help="Poses per second and rover; 10, or 1 in a crowd.", show_default=False)
+    ] = None,
+    seconds: Annotated[
+        float | None, typer.Option(min=0, help="End after so many seconds; a crowd counts from when it is heard.")
+    ] = None,
 ) -> None:
-    """Drive simulated rovers through a rendered world, until Ctrl-C."""
+    """Drive simulated rovers through a rendered world, until Ctrl-C.
+
+    More than 6 that send features are a crowd: their keyframes are made before they start, 12 for each of 24 robots,
+    and up to a thousand robots send them from one process. Each 24 (6 outside of the arena) have a world of their own.
+    """
     check_endpoint(connect)
     keys.check_id(site, "site")
     with _simulation("covista swarm"):
+        from covista_clients.simulation.marching import is_crowd
         from covista_clients.simulation.swarm import SwarmOptions
 
         options = SwarmOptions(
             robots=robots, world=world, seed=seed, rate_hz=rate, connect=connect, site=site, send=send.value
         )
+        default_hz = CROWD_POSE_RATE_HZ if is_crowd(options) else options.pose_rate_hz
+        options = replace(options, pose_rate_hz=default_hz if pose_rate is None else pose_rate)
     progress = _run(options, seconds)
-    print(f"{progress.keyframes} keyframes and {progress.poses} poses, {progress.skipped} skipped", file=sys.stderr)
+    sent = f"{progress.keyframes} keyframes and {progress.poses} poses"
+    print(f"{sent}, {progress.skipped} skipped, at most {progress.most_behind_s:.2f} s behind", file=sys.stderr)
 
 
 def render(
@@ -77,14 +93,23 @@ def _simulation(command: str) -> Iterator[None]:
 
 def _run(options: SwarmOptions, seconds: float | None) -> Progress:
     """Run a swarm in a thread of its own, so that Ctrl-C finds the main one waiting and the rovers leave in order."""
+    from covista_clients.simulation.marching import is_crowd, run_crowd
     from covista_clients.simulation.swarm import run_swarm
 
     stop = threading.Event()
+    run = partial(run_crowd, on_shot=_show) if is_crowd(options) else run_swarm
     with ThreadPoolExecutor(1, "swarm") as pool:
-        running = pool.submit(run_swarm, options, stop, seconds=seconds)
+        running = pool.submit(run, options, stop, seconds=seconds)
         with ends_by_interrupt():
             where = f"{options.robots} rovers in {options.world} send to {options.connect}"
             print(f"{where}; Ctrl-C ends.", file=sys.stderr)
             wait([running])
         stop.set()
         return running.result()
+
+
+def _show(made: int, count: int) -> None:
+    """Tell how many keyframes are made; where lines cannot be replaced, when all are."""
+    if made == count or sys.stderr.isatty():
+        end = "\n" if made == count else ""
+        print(f"\r{made} of {count} keyframes are made", end=end, file=sys.stderr, flush=True)

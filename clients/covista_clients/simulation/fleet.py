@@ -32,7 +32,7 @@ def fleet(
     with ExitStack() as stack:
         session = None
         if len(names) > _SESSIONS:
-            session = _shared_session(connect, stop, stack)
+            session = shared_session(connect, stop, stack)
             if session is None:
                 yield []
                 return
@@ -43,7 +43,8 @@ def fleet(
         yield rovers
 
 
-def _shared_session(connect: str, stop: threading.Event, stack: ExitStack) -> zenoh.Session | None:
+def shared_session(connect: str, stop: threading.Event, stack: ExitStack) -> zenoh.Session | None:
+    """A session that closes with `stack`, as soon as there is a router; None once `stop` is set."""
     config = zenoh_config.config("client", connect=[connect])
     for _ in itertools.count():
         try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -42,8 +43,8 @@ class SwarmOptions:
             raise ValueError(f"a swarm has at least 1 robot, not {self.robots}")
         if self.world not in worlds.WORLDS:
             raise ValueError(f"there is no world {self.world!r}, but {', '.join(worlds.WORLDS)}")
-        if not (self.rate_hz > 0 and self.pose_rate_hz >= 0):
-            raise ValueError("rate_hz must be positive, and pose_rate_hz not negative")
+        if not (0 < self.rate_hz < math.inf and 0 <= self.pose_rate_hz < math.inf):
+            raise ValueError("rate_hz must be positive, and pose_rate_hz not negative, and both finite")
 
 
 @dataclass(frozen=True, slots=True)
