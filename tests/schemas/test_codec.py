@@ -1,5 +1,6 @@
 import contextlib
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +19,20 @@ def assert_same_pose(one: Pose, other: Pose) -> None:
     assert one.time_ns == other.time_ns
     assert one.covariance == other.covariance
     np.testing.assert_allclose(one.orientation_xyzw, other.orientation_xyzw, atol=1e-15)
+
+
+@given(keyframes(), pose_updates)
+@settings(deadline=None)
+def test_a_picture_that_is_encoded_before_its_name_makes_the_same_keyframe(
+    keyframe: Keyframe, update: PoseUpdate
+) -> None:
+    if keyframe.features is None:
+        return
+    picture = codec.encode_picture(keyframe.camera, keyframe.features, keyframe.thumbnail)
+    data = codec.encode_taken(update, picture)
+    named = replace(keyframe, robot=update.robot, boot=update.boot, sequence=update.sequence, pose=update.pose)
+    assert codec.peek_keyframe(data) == (update.robot, update.boot, update.sequence)
+    assert pb.Keyframe.FromString(data) == pb.Keyframe.FromString(codec.encode_keyframe(named))
 
 
 @given(keyframes())

@@ -110,6 +110,7 @@ def _run(options: SwarmOptions, seconds: float | None) -> Progress:
 
 def _show(made: int, count: int) -> None:
     """Tell how many keyframes are made; where lines cannot be replaced, when all are."""
-    if made == count or sys.stderr.isatty():
-        end = "\n" if made == count else ""
-        print(f"\r{made} of {count} keyframes are made", end=end, file=sys.stderr, flush=True)
+    replaces = sys.stderr.isatty()
+    if made == count or replaces:
+        start, end = "\r" if replaces else "", "\n" if made == count else ""
+        print(f"{start}{made} of {count} keyframes are made", end=end, file=sys.stderr, flush=True)

@@ -32,11 +32,27 @@ def test_a_swarm_leaves_when_it_is_interrupted(endpoint: str, ground: Ground) ->
     ground.wait(lambda: not ground.tokens)
 
 
+def test_a_crowd_sends_what_was_made_before(run: Run, endpoint: str, ground: Ground) -> None:
+    arguments = ("--robots", "8", "--world", "wall", "--rate", "4", "--pose-rate", "2", "--send", "features")
+    code, _, err = run("swarm", *arguments, "--seconds", "0.5", "--connect", endpoint)
+    assert code == 0
+    ground.wait(lambda: len(ground.keyframes) == 16 and len(ground.poses) == 8)
+    assert {keyframe.robot for keyframe in ground.keyframes} == {f"r{k + 1}" for k in range(8)}
+    lines = err.splitlines()
+    assert lines[0].startswith("8 rovers in wall send to")
+    assert lines[1] == "72 of 72 keyframes are made"
+    assert lines[2].startswith("16 keyframes and 8 poses, 0 skipped, at most 0.0")
+    ground.wait(lambda: not ground.tokens)
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
         (("swarm", "--world", "moon"), "there is no world 'moon'"),
         (("swarm", "--rate", "0"), "rate_hz must be positive"),
+        (("swarm", "--rate", "inf"), "rate_hz must be positive"),
+        (("swarm", "--pose-rate", "-1"), "pose_rate_hz not negative"),
+        (("swarm", "--pose-rate", "nan", "--send", "features", "--robots", "1000"), "pose_rate_hz not negative"),
         (("swarm", "--connect", "nonsense"), "'nonsense' is not an end point"),
         (("swarm", "--site", "no site", "--seconds", "0"), "site 'no site' does not match"),
         (("render", "moon", "--out", "."), "moon"),
