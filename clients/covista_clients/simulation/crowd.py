@@ -32,12 +32,12 @@ class Crowd:
     way back, and so on. Tiles are filled court by court, and the last one as far as there are robots.
     """
 
-    def __init__(self, stock: Stock, robots: int, seed: int = 0) -> None:
-        """Raises ValueError without robots."""
+    def __init__(self, stock: Stock, robots: int, seed: int = 0, prefix: str = "r") -> None:
+        """Names are the prefix and a number from 1 on. Raises ValueError without robots."""
         if robots < 1:
             raise ValueError(f"a crowd has at least 1 robot, not {robots}")
         self.robots = robots
-        self.names = tuple(f"r{robot + 1}" for robot in range(robots))
+        self.names = tuple(f"{prefix}{robot + 1}" for robot in range(robots))
         self._stock = stock
         tiles = -(-robots // stock.robots)
         self._offsets_m = _laid_out(tiles, stock.upper_m - stock.lower_m + GAP_M)

@@ -25,11 +25,15 @@ GRAIN_S = 0.005
 
 @dataclass(frozen=True, slots=True)
 class March:
-    """How often each robot sends a keyframe and a pose, and for how long; without `seconds` until told otherwise."""
+    """How often each robot sends a keyframe and a pose, and for how long; without `seconds` until told otherwise.
+
+    `first_step` is how far robots have come before, in keyframes.
+    """
 
     rate_hz: float
     pose_rate_hz: float = 1.0
     seconds: float | None = None
+    first_step: int = 0
 
 
 def is_crowd(options: SwarmOptions) -> bool:
@@ -114,7 +118,7 @@ class _Marching:
             self.progress.skipped += 1
             return
         robot = self.turns[due.robot]
-        step = max(0.0, due.t_s * self.plan.rate_hz - due.robot / self.crowd.robots)
+        step = self.plan.first_step + max(0.0, due.t_s * self.plan.rate_hz - due.robot / self.crowd.robots)
         time_ns = self.begin_ns + round(due.t_s * 1e9)
         if due.is_keyframe:
             number = round(step)

@@ -1,30 +1,32 @@
-"""A load that is the same every time: robots that send ready-made keyframes and poses at a fixed rate."""
+"""A load that is the same every time: a crowd that sends ready-made keyframes and poses, from a process of its own."""
 
 from __future__ import annotations
 
 import threading
 import time
 from dataclasses import dataclass, replace
+from functools import cache
+from queue import SimpleQueue
 
-import zenoh
-from covista_clients.simulation import renderer, worlds
-from covista_clients.simulation.paths import Paths
-from covista_schemas import codec, features, keys, zenoh_config
-from covista_schemas.messages import Camera, Features, Keyframe, Pose, PoseUpdate
+from covista_clients.simulation.antenna import antenna
+from covista_clients.simulation.crowd import Crowd
+from covista_clients.simulation.marching import GRAIN_S, March, march
+from covista_clients.simulation.pacing import RealTime
+from covista_clients.simulation.stock import MOST_ROBOTS, Stock, StockOptions, make
+from covista_clients.simulation.swarm import Progress
 
 from covista_service.demo.children import Line, end_soon
 
-WORLD = "arena"
 SITE = "default"
-_BOOT = "bench"
-_CAMERA = Camera(fx=250, fy=250, cx=159.5, cy=119.5, width=320, height=240)
-# Positions along a path; afterwards a robot drives the same way back, and so on.
-_DISTINCT = 12
+PREFIX = "b"
 
 
 @dataclass(frozen=True, slots=True)
 class LoadOptions:
-    """Each of `robots` sends a keyframe of `features` features and a pose, every `period_s`, for `seconds`."""
+    """Each of `robots` sends a keyframe of `features` features and a pose, every `period_s`, for `seconds`.
+
+    A `March` that is sent instead of a word says otherwise.
+    """
 
     connect: str
     seconds: float
@@ -40,62 +42,54 @@ class Prepared:
 
 @dataclass(frozen=True, slots=True)
 class Sent:
-    """Said when the last keyframe is out."""
+    """Said when the last keyframe of a march is out: counts since the beginning, and how late the march was at most."""
 
     keyframes: int
+    poses: int
+    behind_s: float
 
 
-def play(line: Line, options: LoadOptions) -> None:
-    """Make keyframes, wait for a word from the parent, send, say how many, and stay until the line closes."""
-    gone = threading.Event()
-    stock = _stock(options)
+@cache
+def stock(robots: int, features: int) -> Stock:
+    """What so many robots send, made once in a process."""
+    made = make(StockOptions(robots=min(robots, MOST_ROBOTS), features=features))
+    # Nothing stops it.
+    assert made is not None  # noqa: S101 - tells the type checker
+    return made
+
+
+def play(line: Line, options: LoadOptions, ready: Stock | None = None) -> None:
+    """Make keyframes, unless they are `ready`, and send at each word from the parent; leave when the line closes.
+
+    Robots connect at the first word. `Sent` is said after each.
+    """
+    crowd = Crowd(ready or stock(options.robots, options.features), options.robots, prefix=PREFIX)
     line.send(Prepared())
-    if line.receive() is None:
-        return
-    listener = threading.Thread(target=_listen, args=(line, gone), name="orders", daemon=True)
+    orders: SimpleQueue[March | None] = SimpleQueue()
+    gone = threading.Event()
+    listener = threading.Thread(target=_listen, args=(line, options, orders, gone), name="orders", daemon=True)
     listener.start()
-    with zenoh.open(zenoh_config.config("client", connect=[options.connect])) as session:
-        line.send(Sent(_send(session, options, stock, gone)))
-        gone.wait()
+    order = orders.get()
+    if order is None:
+        return
+    with antenna(options.connect, SITE, crowd.names, gone) as raised:
+        if raised is None or not raised.await_heard(gone):
+            return
+        total, step = Progress(), 0
+        while order is not None:
+            order = replace(order, first_step=step)
+            progress = march(crowd, raised, order, RealTime(gone, GRAIN_S), time.time_ns())
+            step += round((order.seconds or 0.0) * order.rate_hz)
+            total.keyframes += progress.keyframes
+            total.poses += progress.poses
+            line.send(Sent(total.keyframes, total.poses, progress.most_behind_s))
+            order = orders.get()
 
 
-def _listen(line: Line, gone: threading.Event) -> None:
-    while line.receive() is not None:
-        pass
+def _listen(line: Line, options: LoadOptions, orders: SimpleQueue[March | None], gone: threading.Event) -> None:
+    usual = March(1 / options.period_s, 1 / options.period_s, options.seconds)
+    while (order := line.receive()) is not None:
+        orders.put(order if isinstance(order, March) else usual)
     end_soon()
     gone.set()
-
-
-def _stock(options: LoadOptions) -> list[list[tuple[Pose, Features]]]:
-    """What each robot sends, there and back along its path."""
-    world = worlds.build(WORLD, robots=options.robots)
-    paths = Paths(world, options.robots)
-
-    def taken(robot: int, step: int) -> tuple[Pose, Features]:
-        pose = paths.pose(robot, step * options.period_s)
-        return pose, features.extract(renderer.render(world, _CAMERA, pose).image, count=options.features)
-
-    way = [[taken(robot, step) for step in range(_DISTINCT)] for robot in range(options.robots)]
-    return [forth + forth[-2:0:-1] for forth in way]
-
-
-def _send(
-    session: zenoh.Session, options: LoadOptions, stock: list[list[tuple[Pose, Features]]], gone: threading.Event
-) -> int:
-    """Send on time until the time is over; robots take turns, evenly over each period."""
-    begin_s = time.monotonic()
-    rounds = int(options.seconds / options.period_s)
-    for turn in range(rounds * options.robots):
-        if gone.wait(max(0.0, begin_s + turn * options.period_s / options.robots - time.monotonic())):
-            return turn
-        sequence, robot = divmod(turn, options.robots)
-        pose, found = stock[robot][sequence % len(stock[robot])]
-        _put(session, f"b{robot + 1}", sequence, replace(pose, time_ns=time.time_ns()), found)
-    return rounds * options.robots
-
-
-def _put(session: zenoh.Session, robot: str, sequence: int, pose: Pose, found: Features) -> None:
-    update = codec.encode_pose(PoseUpdate(robot, _BOOT, sequence, pose))
-    keyframe = codec.encode_keyframe(Keyframe(robot, _BOOT, sequence, _CAMERA, pose, features=found))
-    session.put(keys.pose(SITE, robot), update, encoding=codec.POSE_ENCODING)
-    session.put(keys.keyframe(SITE, robot), keyframe, encoding=codec.KEYFRAME_ENCODING)
+    orders.put(None)

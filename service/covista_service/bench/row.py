@@ -42,6 +42,11 @@ def spread(samples: Sequence[float]) -> float:
     return float(high - low)
 
 
+def quantile(samples: Sequence[float], share: float) -> float:
+    """What a share of samples does not exceed."""
+    return float(np.quantile(samples, share))
+
+
 def timed(
     bench: str,
     case: str,

@@ -14,6 +14,7 @@ from covista_service.bench import (
     predict_planes,
     predict_poses,
     predict_surfaces,
+    scale,
     surface,
     survey,
 )
@@ -27,6 +28,7 @@ BENCHES: Mapping[str, Sequence[Bench]] = {
     "predict": (predict_planes.rows, predict_surfaces.rows, predict_poses.rows),
     "group": (group.rows, group_costs.rows),
     "latency": (latency.rows,),
+    "scale": (scale.rows,),
 }
 
 
