@@ -92,10 +92,12 @@ def march(
         schedule(crowd.robots, plan.rate_hz, plan.pose_rate_hz),
     ):
         if not pace.wait_until(due.t_s):
-            break
+            return progress
         progress.behind_s = max(0.0, pace.now_s() - due.t_s)
         progress.most_behind_s = max(progress.most_behind_s, progress.behind_s)
         marching.send(due)
+    if plan.seconds is not None:
+        pace.wait_until(plan.seconds)
     return progress
 
 

@@ -25,6 +25,7 @@ from covista_service.loop import Loop
 from covista_service.station.groups import Groups
 from covista_service.telemetry import Summary, Telemetry
 
+READINGS = "readings"
 _NS_PER_MS = 1e6
 
 
@@ -92,7 +93,7 @@ class _Instruments:
 
 
 def play(line: Line, settings: Settings) -> None:
-    """Serve. Says `Ready` or `Failed`, answers every message with `Readings`, ends with its line."""
+    """Serve. Says `Ready` or `Failed`, answers `READINGS` with `Readings` and all else with `Summary`."""
     telemetry.log_to_stderr(settings.log_level)
     instruments = _Instruments()
 
@@ -107,8 +108,9 @@ def play(line: Line, settings: Settings) -> None:
 
 
 def _answer(line: Line, running: serve.Running, instruments: _Instruments) -> None:
-    while line.receive() is not None:
-        line.send(instruments.read(running.summary()))
+    while (word := line.receive()) is not None:
+        summary = running.summary()
+        line.send(instruments.read(summary) if word == READINGS else summary)
     end_soon()
     running.stop()
 

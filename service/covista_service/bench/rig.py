@@ -15,13 +15,14 @@ from covista_clients.simulation.marching import March
 from covista_schemas.errors import CovistaError
 
 from covista_service.bench import instruments, load
-from covista_service.bench.instruments import Readings
+from covista_service.bench.instruments import READINGS, Readings
 from covista_service.bench.load import LoadOptions, Prepared, Sent
 from covista_service.config import Settings
 from covista_service.demo import children
 from covista_service.demo.children import Child
 from covista_service.demo.tidings import Failed, Ready
 from covista_service.demo.watch import Watch
+from covista_service.telemetry import Summary
 
 _DRAIN_S = 5.0
 _WARM_S = 120.0
@@ -86,8 +87,13 @@ class Rig:
 
     def readings(self) -> Readings:
         """What the instruments say now."""
-        self.station.line.send("readings")
+        self.station.line.send(READINGS)
         return expect(self.station, Readings)
+
+    def summary(self) -> Summary:
+        """What the station has measured of itself so far."""
+        self.station.line.send("summary")
+        return expect(self.station, Summary)
 
     def window(self, plan: March, sent: Sent) -> tuple[Window, Sent]:
         """Let the robots send, after all that they have `sent` before, and say what came of it."""
@@ -110,7 +116,7 @@ class Rig:
         """Wait until nothing is under way for a moment; False after `timeout_s`."""
         deadline_s, idle = time.monotonic() + timeout_s, 0
         while idle < 3:
-            idle = 0 if self.readings().summary.under_way else idle + 1
+            idle = 0 if self.summary().under_way else idle + 1
             if time.monotonic() > deadline_s:
                 return False
             time.sleep(_POLL_S)

@@ -10,6 +10,8 @@ from covista_service.bench import (
     group,
     group_costs,
     latency,
+    memory,
+    overload,
     planes,
     predict_planes,
     predict_poses,
@@ -29,6 +31,8 @@ BENCHES: Mapping[str, Sequence[Bench]] = {
     "group": (group.rows, group_costs.rows),
     "latency": (latency.rows,),
     "scale": (scale.rows,),
+    "memory": (memory.rows,),
+    "overload": (overload.rows,),
 }
 
 

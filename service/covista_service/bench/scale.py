@@ -75,7 +75,7 @@ def rows(long: bool) -> Iterator[Row]:
     for robots in LONG_SIZES if long else SIZES:
         sizes.append(measured(robots, long=long))
         yield from _rows(sizes[-1])
-    yield from _against(sizes[-1], sizes[0])
+    yield from against(sizes[-1], sizes[0])
 
 
 def measured(robots: int, *, long: bool) -> Size:
@@ -116,7 +116,8 @@ def _rows(size: Size) -> Iterator[Row]:
     yield _row(f"taken_{name}", [size.saturated.surveyed_per_s], "keyframes/s")
 
 
-def _against(many: Size, few: Size) -> Iterator[Row]:
+def against(many: Size, few: Size) -> Iterator[Row]:
+    """`scale/surveys` and `scale/cpu`: work a keyframe, of many robots to that of few."""
     peer = f"{few.robots} robots, and here {many.robots}"
     surveys, cpu = median(many.surveys) / median(few.surveys), median(many.cpu_ms) / median(few.cpu_ms)
     yield Row(

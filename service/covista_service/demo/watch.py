@@ -34,9 +34,13 @@ class Watch:
         """All pairs."""
         return self._get("/pairs", PairsReport)
 
+    def robots(self) -> RobotsReport:
+        """All robots, and what became of their messages."""
+        return self._get("/robots", RobotsReport)
+
     def keyframes(self) -> Counters:
         """What became of all robots' keyframes, as one sum."""
-        counters = [robot.keyframes for robot in self._get("/robots", RobotsReport).robots]
+        counters = [robot.keyframes for robot in self.robots().robots]
         return Counters(
             received=sum(each.received for each in counters),
             missing=sum(each.missing for each in counters),
