@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from covista_service.bench.memory import FLAT_MB_PER_H, Trend, trend_of
+from covista_service.bench.memory import Trend, trend_of
 
 
 def looks(mb_per_h: float, noise_mb: float, seed: int = 0) -> list[tuple[float, float]]:
@@ -28,14 +28,19 @@ def test_growth_while_a_station_starts_is_not_looked_at() -> None:
     assert abs(trend_of(settled).slope) < 1
 
 
+def test_growth_is_told_as_a_share_of_what_was_there() -> None:
+    # 300 MB, and 150 more in an hour: over 8 minutes 20.
+    assert trend_of(looks(150.0, 0.0)).share == pytest.approx(20 / 305, rel=0.01)
+
+
 @pytest.mark.parametrize(
-    ("slope", "margin", "flat"),
-    [(0.0, 0.0, True), (5.0, 6.0, True), (-50.0, 1.0, True), (FLAT_MB_PER_H, 0.0, True), (5.0, 1.0, False)],
+    ("slope", "margin", "share", "flat"),
+    [(0, 0, 0, True), (5, 6, 0.5, True), (-50, 1, -0.1, True), (5, 1, 0.009, True), (5, 1, 0.011, False)],
 )
 def test_flat_is_what_cannot_be_told_from_no_growth_or_is_none_to_speak_of(
-    slope: float, margin: float, flat: bool
+    slope: float, margin: float, share: float, flat: bool
 ) -> None:
-    assert Trend(slope, margin).flat is flat
+    assert Trend(slope, margin, share).flat is flat
 
 
 def test_a_few_looks_are_enough() -> None:
