@@ -136,6 +136,11 @@ def test_one_keyframe_is_enough_to_stand_still() -> None:
     assert crowd.pose(2, 0.0) == crowd.pose(2, 17.5)
 
 
+def test_names_are_numbers_from_1_on() -> None:
+    assert Crowd(STOCK, 3).names == ("r1", "r2", "r3")
+    assert Crowd(STOCK, 2, prefix="b").names == ("b1", "b2")
+
+
 def test_a_crowd_is_somebody() -> None:
     with pytest.raises(ValueError, match="at least 1 robot, not 0"):
         Crowd(STOCK, 0)

@@ -87,6 +87,24 @@ def test_poses_lie_on_the_way_from_keyframe_to_keyframe(ground: Ground, raised: 
                 np.testing.assert_allclose(update.pose.position_m, between, atol=1e-6)
 
 
+def test_a_march_goes_on_where_the_one_before_ended(ground: Ground, raised: Antenna) -> None:
+    march(CROWD, raised, March(1.0, 0.0, 2.0), AtOnce(), BEGIN_NS)
+    march(CROWD, raised, March(1.0, 1.0, 1.0, first_step=2), AtOnce(), BEGIN_NS + 2 * 10**9)
+    sent = Sent(ground, 60, 20)
+    for robot, name in enumerate(CROWD.names):
+        assert [keyframe.sequence for keyframe in sent.keyframes[name]] == [0, 1, 2]
+        at = [keyframe.pose.position_m for keyframe in sent.keyframes[name]]
+        assert at == [CROWD.pose(robot, step).position_m for step in range(3)]
+        assert sent.poses[name][0].pose.position_m == at[2]
+
+
+def test_what_falls_due_while_it_sleeps_goes_out_together() -> None:
+    pace = RealTime(threading.Event(), grain_s=0.02)
+    assert pace.wait_until(0.001)
+    assert pace.now_s() >= 0.02
+    assert pace.wait_until(0.015)
+
+
 def test_neighbours_do_not_send_in_a_row(ground: Ground, raised: Antenna) -> None:
     march(CROWD, raised, March(1.0, 0.0, 1.0), AtOnce(), BEGIN_NS)
     Sent(ground, 20, 0)
