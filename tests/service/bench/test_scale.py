@@ -19,9 +19,9 @@ def window(surveys: int, cpu_s: float, regrouping_s: float = 0.0) -> Window:
     )
 
 
-def size(robots: int, surveys: int, cpu_s: float, regrouping_s: float = 0.0) -> Size:
+def size(robots: int, surveys: int, cpu_s: float, regrouping_s: float = 0.0, *, settled: bool = True) -> Size:
     each = window(surveys, cpu_s, regrouping_s)
-    return Size(robots, (each, each, each), each)
+    return Size(robots, settled, (each, each, each), each)
 
 
 def test_work_is_counted_by_keyframe_and_regrouping_apart() -> None:
@@ -43,3 +43,8 @@ def test_the_largest_swarm_is_heldagainst_the_smallest(surveys: int, cpu_s: floa
     assert tuple(row.holds for row in found) == holds
     assert found[0].median == pytest.approx(surveys / 40)
     assert found[1].median == pytest.approx(cpu_s)
+
+
+def test_what_a_station_was_behind_with_says_nothing() -> None:
+    found = against(size(1000, 40, 1.0, settled=False), size(50, 40, 1.0))
+    assert not any(row.holds for row in found)
