@@ -46,6 +46,7 @@ UNKNOWN_DESCRIPTOR = "unknown_descriptor"
 NO_CONTENT = "no_content"
 BAD_IMAGE = "bad_image"
 IMAGE_TOO_LARGE = "image_too_large"
+TOO_LARGE = "too_large"
 CODES = (
     MALFORMED,
     WRONG_ID,
@@ -56,7 +57,10 @@ CODES = (
     NO_CONTENT,
     BAD_IMAGE,
     IMAGE_TOO_LARGE,
+    TOO_LARGE,
 )
+# A pose with its covariance has some 400 bytes; the rest is for fields that are not known yet.
+MAX_POSE_BYTES = 16 * 1024
 
 _M = TypeVar("_M", bound=Message)
 _Vector = tuple[float, float, float]
@@ -139,6 +143,8 @@ def decode_keyframe(data: bytes, *, robot: str | None = None) -> Keyframe:
 
 def decode_pose(data: bytes, *, robot: str | None = None) -> PoseUpdate:
     """The pose in `data`; with `robot`, the id inside must be that of the key. Raises DecodeError."""
+    if len(data) > MAX_POSE_BYTES:
+        raise too_large_pose(len(data))
     message = _parse(pb.Pose(), data)
     _check_sender(message.robot, message.boot, robot)
     pose = _decode_pose(message, tuple(message.covariance))
@@ -152,7 +158,14 @@ def peek_keyframe(data: bytes, *, robot: str | None = None) -> tuple[str, str, i
 
 def peek_pose(data: bytes, *, robot: str | None = None) -> tuple[str, str, int]:
     """Only (robot, boot, sequence) of the pose in `data`, checked as `decode_pose` does. Raises DecodeError."""
+    if len(data) > MAX_POSE_BYTES:
+        raise too_large_pose(len(data))
     return _peek(pb.Pose(), data, robot)
+
+
+def too_large_pose(size: int) -> DecodeError:
+    """What is wrong with a pose of so many bytes."""
+    return DecodeError(TOO_LARGE, "payload", f"{size} bytes, more than the {MAX_POSE_BYTES} that a pose may have")
 
 
 def _peek(message: pb.Keyframe | pb.Pose, data: bytes, robot: str | None) -> tuple[str, str, int]:

@@ -70,8 +70,8 @@ class Source(Protocol):
     def attach(self, wake: Callable[[], None]) -> None:
         """Say whom to wake, from any thread, when there are events."""
 
-    def drain(self, limit: int) -> tuple[Iterable[Event], bool]:
-        """Events of up to `limit` robots, and whether there are more."""
+    def drain(self, limit: int, now_ns: int) -> tuple[Iterable[Event], int | None]:
+        """Events of up to `limit` robots, and when there are more, perhaps at once; None: not before it wakes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,6 +157,7 @@ class Loop:
         self._awake = asyncio.Event()
         self._asyncio: asyncio.AbstractEventLoop | None = None
         self._turned_ns = clock()
+        self._next_ns: int | None = None
 
     async def run(self) -> None:
         """Turn until cancelled: when there is something to do, and every quarter of a second."""
@@ -164,7 +165,7 @@ class Loop:
         self._source.attach(self.wake)
         while True:
             try:
-                async with asyncio.timeout(SOON_S if self._station.waits else TICK_S):
+                async with asyncio.timeout(self._rest_s()):
                     await self._awake.wait()
             except TimeoutError:
                 pass
@@ -182,14 +183,15 @@ class Loop:
 
     def turn(self) -> bool:
         """Take in one batch and act on it; True if there is more to take in."""
-        events, more = self._source.drain(BATCH)
+        began_ns, self._next_ns = self._clock(), None
+        events, self._next_ns = self._source.drain(BATCH, began_ns)
         effects: list[Effect] = []
         results = [self._results.popleft() for _ in range(len(self._results))]
         for event in itertools.chain(results, events, (Tick(),)):
             effects += self._receive(event)
         self._tell(effects)
         self._turned_ns = self._clock()
-        return more or bool(self._results)
+        return bool(self._results) or (self._next_ns is not None and self._next_ns <= began_ns)
 
     def wake(self) -> None:
         """Have a turn soon; from any thread, at any time."""
@@ -225,6 +227,13 @@ class Loop:
     def silent_s(self) -> float:
         """Seconds since the last turn."""
         return (self._clock() - self._turned_ns) / _NS_PER_S
+
+    def _rest_s(self) -> float:
+        """How long to rest until something is to be done, unless somebody wakes it."""
+        rest_s = SOON_S if self._station.waits else TICK_S
+        if self._next_ns is None:
+            return rest_s
+        return min(rest_s, max(0.0, (self._next_ns - self._clock()) / _NS_PER_S))
 
     def _receive(self, event: Event) -> Sequence[Effect]:
         self._count(event)

@@ -1,4 +1,5 @@
 import asyncio
+import time
 from collections.abc import Awaitable, Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
@@ -9,7 +10,7 @@ from covista_schemas.errors import DecodeError
 from covista_schemas.reports import EventKind, FoundBy
 from covista_service.link.inbox import Inbox
 from covista_service.link.mailbox import Letter, Mailboxes
-from covista_service.loop import Loop, News
+from covista_service.loop import TICK_S, Loop, News
 from covista_service.station.events import Event, MessagesReceived, SurveyPair, TokenSeen
 from covista_service.station.station import Station
 from covista_service.telemetry import WORKER_FAILED, Telemetry
@@ -51,6 +52,10 @@ class Desk:
 
     def put(self, data: bytes, robot: str, sequence: int = 0) -> None:
         self.mailboxes.put(Letter(robot, "keyframe", "b0", sequence, data, self.now_ns))
+
+    def wait(self) -> None:
+        """Let so much time pass that every robot has its turn again."""
+        self.now_ns += 100_000_000
 
     def settle(self) -> None:
         for _ in range(10):
@@ -119,6 +124,7 @@ def test_a_failed_extraction_drops_its_keyframe_alone(failure: Exception, code: 
     assert robot.last_problem is not None
     assert str(failure) in robot.last_problem
     desk.hands.failure = None
+    desk.wait()
     desk.put(picture_bytes("r1", sequence=1), "r1", 1)
     desk.settle()
     assert desk.loop.snapshot().robots["r1"].keyframes.used == 1
@@ -137,6 +143,7 @@ def test_a_crew_that_cannot_take_a_job_gives_it_back(monkeypatch: pytest.MonkeyP
             desk.put(keyframe_bytes("r1", 0.0, sequence=turn), "r1", turn)
             desk.put(keyframe_bytes("r2", 1.0, sequence=turn), "r2", turn)
             desk.settle()
+            desk.wait()
     assert desk.telemetry.summary().under_way == 0
     desk.put(keyframe_bytes("r1", 0.0, sequence=4), "r1", 4)
     desk.settle()
@@ -194,13 +201,17 @@ class Spring:
     def __init__(self) -> None:
         self.wake: Callable[[], None] = lambda: None
         self.waiting: list[Event] = []
+        self.next_ns: int | None = None
+        self.drained = 0
 
     def attach(self, wake: Callable[[], None]) -> None:
         self.wake = wake
 
-    def drain(self, limit: int) -> tuple[Iterable[Event], bool]:
+    def drain(self, limit: int, now_ns: int) -> tuple[Iterable[Event], int | None]:
+        self.drained += 1
         taken, self.waiting = self.waiting, []
-        return taken, False
+        next_ns, self.next_ns = self.next_ns, None
+        return taken, next_ns
 
 
 async def until(look: Callable[[], bool]) -> None:
@@ -254,10 +265,43 @@ def test_a_source_that_fails_once_is_asked_again(caplog: pytest.LogCaptureFixtur
         spring.wake()
         await until(lambda: "r1" in loop.snapshot().robots)
 
-    def broken(limit: int) -> tuple[Iterable[Event], bool]:
+    def broken(limit: int, now_ns: int) -> tuple[Iterable[Event], int | None]:
         raise OSError
 
     running(scenario)
+
+
+def test_what_falls_due_later_is_fetched_then_without_a_wake_up() -> None:
+    async def scenario(loop: Loop, spring: Spring) -> None:
+        await asyncio.sleep(0)
+        spring.next_ns = time.time_ns() + 30_000_000
+        spring.wake()
+        await until(lambda: spring.next_ns is None)
+        drained, spring.waiting = spring.drained, [TokenSeen("r1", "b0")]
+        async with asyncio.timeout(TICK_S / 2):
+            await until(lambda: "r1" in loop.snapshot().robots)
+        assert spring.drained > drained
+
+    running(scenario)
+
+
+def test_a_robot_in_a_hurry_has_its_turns_and_another_its_own() -> None:
+    desk = Desk()
+    for sequence in range(60):
+        desk.put(keyframe_bytes("r1", 0.0, sequence=sequence), "r1", sequence)
+        if sequence % 20 == 7:
+            desk.put(keyframe_bytes("r2", 1.0, sequence=sequence // 20), "r2", sequence // 20)
+            desk.loop.turn()
+            assert desk.loop.snapshot().robots["r2"].keyframes.received == sequence // 20 + 1
+        desk.now_ns += 10_000_000
+        desk.loop.turn()
+    desk.wait()
+    desk.settle()
+    hurry, steady = (desk.loop.snapshot().robots[robot].keyframes for robot in ("r1", "r2"))
+    assert (hurry.received, steady.received) == (60, 3)
+    assert steady.used == 3
+    assert hurry.used + hurry.replaced == 60
+    assert hurry.used <= 600 / 50 + 2
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ class Inbox:
         """Say whom to wake, from any thread, when there is mail."""
         self._mailboxes.attach(wake)
 
-    def drain(self, limit: int) -> tuple[Iterator[Event], bool]:
-        """Events of up to `limit` robots, and whether there are more."""
-        mail, more = self._mailboxes.drain(limit)
-        return (event for each in mail for event in events_of(each)), more
+    def drain(self, limit: int, now_ns: int) -> tuple[Iterator[Event], int | None]:
+        """Events of up to `limit` robots, and when there are more; None: not before somebody is woken."""
+        mail, next_ns = self._mailboxes.drain(limit, now_ns)
+        return (event for each in mail for event in events_of(each)), next_ns

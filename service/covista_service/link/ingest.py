@@ -1,21 +1,30 @@
-"""From zenoh's threads into the mailboxes: copy the bytes, read the name, nothing more."""
+"""From zenoh's channels into the mailboxes: copy the bytes, read the name, nothing more.
+
+A thread per topic takes all that has come whenever it gets its turn. (With a callback per message, each would wait for
+the interpreter anew, and beside busy threads some thousand messages a second would be all that gets through.)
+"""
 
 from __future__ import annotations
 
 import logging
+import threading
 import time
 from collections.abc import Callable
 from typing import Any
 
 import zenoh
 from covista_schemas import codec, keys
-from covista_schemas.errors import DecodeError, KeyExpressionError
-from covista_schemas.keys import RobotKey, RobotTopic
+from covista_schemas import robot_pb2 as pb
+from covista_schemas.errors import KeyExpressionError
+from covista_schemas.keys import RobotTopic
+from covista_schemas.names import KeyReader, NameReader
 
 from covista_service.link.mailbox import Letter, Mailboxes
 from covista_service.station.events import Topic
 
-Peek = Callable[..., tuple[str, str, int]]
+WRONG_KEY = "wrong_key"
+# Messages between zenoh and the thread that takes them; when a channel is full, senders have to wait.
+_POSES, _KEYFRAMES = 512, 64
 
 log = logging.getLogger(__name__)
 
@@ -29,49 +38,87 @@ class Ingest:
         self._mailboxes = mailboxes
         self._clock = clock
         self._closed = False
+        self._subscribers: list[zenoh.Subscriber[Any]] = []
+        self._threads: list[threading.Thread] = []
+        self._listen(session, site, RobotTopic.KEYFRAME, _KEYFRAMES, _Opener("keyframe", mailboxes, clock))
+        self._listen(session, site, RobotTopic.POSE, _POSES, _Opener("pose", mailboxes, clock))
         alive = keys.every(site, RobotTopic.ALIVE)
-        self._subscribers: list[zenoh.Subscriber[Any]] = [
-            session.declare_subscriber(keys.every(site, RobotTopic.KEYFRAME), self._keyframe),
-            session.declare_subscriber(keys.every(site, RobotTopic.POSE), self._pose),
-            session.liveliness().declare_subscriber(alive, self._token, history=True),
-        ]
+        self._subscribers.append(session.liveliness().declare_subscriber(alive, self._token, history=True))
 
     def close(self) -> None:
         """Hear no more."""
         self._closed = True
         for subscriber in self._subscribers:
             subscriber.undeclare()
+        for thread in self._threads:
+            thread.join()
 
-    def _keyframe(self, sample: zenoh.Sample) -> None:
-        self._message(sample, "keyframe", codec.peek_keyframe)
+    def _listen(self, session: zenoh.Session, site: str, topic: RobotTopic, capacity: int, opener: _Opener) -> None:
+        subscriber = session.declare_subscriber(keys.every(site, topic), zenoh.handlers.FifoChannel(capacity))
+        thread = threading.Thread(target=self._read, args=(subscriber.handler, opener), name=f"covista-{topic}s")
+        thread.start()
+        self._subscribers.append(subscriber)
+        self._threads.append(thread)
 
-    def _pose(self, sample: zenoh.Sample) -> None:
-        self._message(sample, "pose", codec.peek_pose)
-
-    def _message(self, sample: zenoh.Sample, topic: Topic, peek: Peek) -> None:
-        arrived_ns = self._clock()
-        key = self._key(sample)
-        if key is None:
-            return
-        data = sample.payload.to_bytes()
+    def _read(self, channel: zenoh.handlers.Handler[zenoh.Sample], opener: _Opener) -> None:
         try:
-            _, boot, sequence = peek(data, robot=key.robot)
-        except DecodeError as error:
-            self._mailboxes.refuse(key.robot, topic, error.code, str(error), arrived_ns)
-        else:
-            self._mailboxes.put(Letter(key.robot, topic, boot, sequence, data, arrived_ns))
+            while True:
+                sample: zenoh.Sample | None = channel.recv()
+                while sample is not None:
+                    if not self._closed:
+                        _survive(opener.open, sample)
+                    sample = channel.try_recv()
+        except zenoh.ZError:
+            log.debug("a channel was closed")
 
     def _token(self, sample: zenoh.Sample) -> None:
-        key = self._key(sample)
-        if key is not None and key.boot is not None:
+        if self._closed:
+            return
+        try:
+            key = keys.parse_robot_key(str(sample.key_expr))
+        except KeyExpressionError:
+            self._mailboxes.turn_away(WRONG_KEY)
+            return
+        if key.boot is not None:
             self._mailboxes.token(key.robot, key.boot, sample.kind == zenoh.SampleKind.PUT, self._clock())
 
-    def _key(self, sample: zenoh.Sample) -> RobotKey | None:
-        if self._closed:
-            return None
-        try:
-            return keys.parse_robot_key(str(sample.key_expr))
-        except KeyExpressionError as error:
-            self._mailboxes.turn_away("wrong_key")
-            log.debug("%s", error)
-            return None
+
+class _Opener:
+    """Reads the names of one topic's messages, in one thread."""
+
+    def __init__(self, topic: Topic, mailboxes: Mailboxes, clock: Callable[[], int]) -> None:
+        self._topic = topic
+        self._mailboxes = mailboxes
+        self._clock = clock
+        self._keys = KeyReader()
+        self._names = NameReader(pb.Pose() if topic == "pose" else pb.Keyframe())
+        self._most_bytes = codec.MAX_POSE_BYTES if topic == "pose" else None
+
+    def open(self, sample: zenoh.Sample) -> None:
+        """Put a message into its robot's mailbox."""
+        arrived_ns = self._clock()
+        robot = self._keys.read(str(sample.key_expr))
+        if robot is None:
+            self._mailboxes.turn_away(WRONG_KEY)
+            return
+        payload = sample.payload
+        if self._most_bytes is not None and len(payload) > self._most_bytes:
+            size = len(payload)
+            self._mailboxes.refuse(
+                robot, self._topic, codec.TOO_LARGE, lambda: str(codec.too_large_pose(size)), arrived_ns
+            )
+            return
+        data = payload.to_bytes()
+        name = self._names.read(data, robot)
+        if isinstance(name, str):
+            self._mailboxes.refuse(robot, self._topic, name, lambda: self._names.complain(data, robot), arrived_ns)
+        else:
+            self._mailboxes.put(Letter(robot, self._topic, name[0], name[1], data, arrived_ns))
+
+
+def _survive(take: Callable[[zenoh.Sample], None], sample: zenoh.Sample) -> None:
+    """A bug that one message brings to light costs that message, and not the thread."""
+    try:
+        take(sample)
+    except Exception:
+        log.exception("cannot take a message in")

@@ -1,31 +1,47 @@
 """Where messages wait between zenoh's threads and the loop: bounded, newest wins, every one counted.
 
-A flood costs its sender its own older messages and nobody else anything.
+A flood costs its sender its own older messages and nobody else anything: robots take turns, each at most once per gap
+(`turns.Pace`), and what comes in between is conflated.
 """
 
 from __future__ import annotations
 
 import threading
-from collections import Counter, OrderedDict
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
+from covista_service.link.places import IDLE_NS, TOO_MANY_ROBOTS, UNKNOWN_ROBOT, Places
+from covista_service.link.turns import Pace, Turns
 from covista_service.station.events import Topic
+
+__all__ = ["IDLE_NS", "OVERFLOW", "TOO_MANY_ROBOTS", "UNKNOWN_ROBOT", "Depths", "Letter", "Mail", "Mailboxes"]
 
 MessageId = tuple[str, int]
 OVERFLOW = "overflow"
-TOO_MANY_ROBOTS = "too_many_robots"
 MAX_ROBOTS = 4096
 # Waiting payloads of all robots, in all.
 MAX_BYTES = 256 * 1024 * 1024
 # Names of messages, and boots of tokens, that a robot may have waiting; beyond, they are counted only.
 MAX_NAMES = 16_384
 MAX_TOKENS = 64
-# A robot silent for so long gives its place to another when the house is full.
-IDLE_NS = 600 * 1_000_000_000
+
+Explain = Callable[[], str]
+# What a robot stands in line for; in this order its mail is handed over.
+Line = Literal["token", "keyframe", "pose"]
+LINES: tuple[Line, ...] = ("token", "keyframe", "pose")
+_MS = 1_000_000
+# A keyframe costs the loop up to a millisecond, a pose some hundredths to tenths of one.
+PACES: Mapping[Line, Pace] = {
+    "token": Pace(20 * _MS),
+    "keyframe": Pace(50 * _MS),
+    "pose": Pace(20 * _MS, per_s=2000, burst=256),
+}
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+# Not frozen, for the sake of twenty thousand a second: freezing would treble what making one costs.
+@dataclass(slots=True, eq=False)
 class Letter:
     """A message as it came, its name read and nothing else."""
 
@@ -61,47 +77,65 @@ class Refusal:
 
 @dataclass(slots=True, eq=False)
 class Box:
-    """One robot's messages of one topic since the last drain."""
+    """One robot's messages of one topic since the last drain; `kept` stands at `kept_at` among the names."""
 
     names: list[MessageId] = field(default_factory=list)
     kept: Letter | None = None
+    kept_at: int = 0
     refusals: dict[str, Refusal] = field(default_factory=dict)
     arrived_ns: int = 0
 
-    def refuse(self, code: str, text: str) -> None:
-        """Count a message that is not even worth a name."""
-        refusal = self.refusals.setdefault(code, Refusal(0, text))
+    def refuse(self, code: str, explain: Explain) -> None:
+        """Count a message that is not even worth a name; only the first of a burst is put into words."""
+        refusal = self.refusals.get(code)
+        if refusal is None:
+            refusal = self.refusals[code] = Refusal(0, explain())
         refusal.count += 1
-        refusal.text = text
+
+    def put(self, letter: Letter) -> None:
+        """Take a message in; where there is no place for its name, one that is not the newest loses its own."""
+        kept = self.kept
+        newest = kept is None or kept.boot != letter.boot or kept.sequence < letter.sequence
+        if len(self.names) < MAX_NAMES:
+            self.names.append(letter.name)
+            at = len(self.names) - 1
+        else:
+            self.refuse(OVERFLOW, _too_fast)
+            at = self.kept_at
+            if newest:
+                self.names[at] = letter.name
+        if newest:
+            self.kept, self.kept_at = letter, at
 
 
 @dataclass(slots=True, eq=False)
 class Mail:
-    """All that one robot sent since the last drain; `tokens` says by boot whether its liveliness token is there."""
+    """What one robot sent since the last drain; `tokens` says by boot whether its liveliness token is there."""
 
     robot: str
     boxes: dict[Topic, Box] = field(default_factory=dict)
     tokens: dict[str, bool] = field(default_factory=dict)
 
-    def box(self, topic: Topic, arrived_ns: int) -> Box:
-        """The box of a topic, stamped with an arrival."""
-        box = self.boxes.setdefault(topic, Box())
-        box.arrived_ns = arrived_ns
-        return box
-
 
 class Mailboxes:
-    """A mailbox per robot. Zenoh's threads put, the loop drains; `wake` is called once per burst, in their threads."""
+    """A mailbox per robot. Zenoh's threads put, the loop drains.
 
-    def __init__(self, max_robots: int = MAX_ROBOTS, max_bytes: int = MAX_BYTES) -> None:
-        self._max_robots = max_robots
+    `wake` is called in their threads, once per burst: when something falls due earlier than what the last drain said.
+    """
+
+    def __init__(
+        self, max_robots: int = MAX_ROBOTS, max_bytes: int = MAX_BYTES, paces: Mapping[Line, Pace] = PACES
+    ) -> None:
         self._max_bytes = max_bytes
         self._lock = threading.Lock()
-        self._mail: OrderedDict[str, Mail] = OrderedDict()
-        self._last_ns: OrderedDict[str, int] = OrderedDict()
+        self._mail: dict[str, Mail] = {}
+        self._turns = {line: Turns(paces[line]) for line in LINES}
+        self._places = Places(max_robots)
         self._bytes = 0
         self._turned_away: Counter[str] = Counter()
         self._wake: Callable[[], None] = _nobody
+        # When the loop comes anyway.
+        self._awaited_ns: int | None = None
 
     @property
     def turned_away(self) -> dict[str, int]:
@@ -129,63 +163,102 @@ class Mailboxes:
     def put(self, letter: Letter) -> None:
         """Put a message; it replaces what is waiting, unless it is older within the same boot."""
         with self._lock:
-            mail, first = self._open(letter.robot, letter.arrived_ns)
-            if mail is not None:
-                self._put(mail.box(letter.topic, letter.arrived_ns), letter)
-        self._ring(first)
+            mail = self._open(letter.robot, letter.arrived_ns, readable=True)
+            sooner = mail is not None and self._put(mail, letter)
+        if sooner:
+            self._wake()
 
-    def refuse(self, robot: str, topic: Topic, code: str, text: str, arrived_ns: int) -> None:
-        """Count a message of a robot that is so broken that its name cannot be read."""
+    def refuse(self, robot: str, topic: Topic, code: str, explain: Explain, arrived_ns: int) -> None:
+        """Count a message of a robot that is so broken that its name cannot be read; `explain` says what is wrong."""
         with self._lock:
-            mail, first = self._open(robot, arrived_ns)
+            mail = self._open(robot, arrived_ns, readable=False)
+            sooner = False
             if mail is not None:
-                mail.box(topic, arrived_ns).refuse(code, text)
-        self._ring(first)
+                box, sooner = self._box(mail, topic, arrived_ns)
+                box.refuse(code, explain)
+        if sooner:
+            self._wake()
 
     def token(self, robot: str, boot: str, alive: bool, arrived_ns: int) -> None:
         """Note that a liveliness token appeared or vanished."""
         with self._lock:
-            mail, first = self._open(robot, arrived_ns)
-            if mail is not None and (boot in mail.tokens or len(mail.tokens) < MAX_TOKENS):
-                # Taken out first, so that the order of the dictionary is that of arrival.
-                mail.tokens.pop(boot, None)
-                mail.tokens[boot] = alive
-        self._ring(first)
-
-    def drain(self, limit: int) -> tuple[list[Mail], bool]:
-        """The mail of up to `limit` robots, those first that have waited longest, and whether there is more."""
-        with self._lock:
-            mail = [self._mail.popitem(last=False)[1] for _ in range(min(limit, len(self._mail)))]
-            self._bytes -= sum(_weight(box.kept) for each in mail for box in each.boxes.values())
-            return mail, bool(self._mail)
-
-    def _open(self, robot: str, now_ns: int) -> tuple[Mail | None, bool]:
-        """The robot's mail, None where there is no place for it, and whether it is the first of a burst."""
-        if robot not in self._last_ns and len(self._last_ns) >= self._max_robots:
-            idle, last_ns = next(iter(self._last_ns.items()))
-            if idle in self._mail or now_ns - last_ns < IDLE_NS:
-                self._turned_away[TOO_MANY_ROBOTS] += 1
-                return None, False
-            del self._last_ns[idle]
-        self._last_ns[robot] = now_ns
-        self._last_ns.move_to_end(robot)
-        first = not self._mail
-        return self._mail.setdefault(robot, Mail(robot)), first
-
-    def _put(self, box: Box, letter: Letter) -> None:
-        more = len(letter.data) - _weight(box.kept)
-        if len(box.names) >= MAX_NAMES or self._bytes + more > self._max_bytes:
-            box.refuse(OVERFLOW, "came faster than the station could take it")
-            return
-        box.names.append(letter.name)
-        kept = box.kept
-        if kept is None or kept.boot != letter.boot or kept.sequence < letter.sequence:
-            box.kept = letter
-            self._bytes += more
-
-    def _ring(self, first: bool) -> None:
-        if first:
+            mail = self._open(robot, arrived_ns, readable=True)
+            sooner = mail is not None and self._token(mail, boot, alive, arrived_ns)
+        if sooner:
             self._wake()
+
+    def drain(self, limit: int, now_ns: int) -> tuple[list[Mail], int | None]:
+        """The mail of up to `limit` robots of each line whose turn it is, and when to come again; None: when woken.
+
+        Tokens and keyframes go before poses, and who has waited longest goes first.
+        """
+        with self._lock:
+            handed: dict[str, Mail] = {}
+            for line, turns in self._turns.items():
+                for robot in turns.take(limit, now_ns):
+                    self._hand_over(line, self._mail[robot], handed.setdefault(robot, Mail(robot)))
+            nexts_ns = [turns.next_ns(now_ns) for turns in self._turns.values()]
+            self._awaited_ns = min((next_ns for next_ns in nexts_ns if next_ns is not None), default=None)
+            return list(handed.values()), self._awaited_ns
+
+    def _open(self, robot: str, now_ns: int, *, readable: bool) -> Mail | None:
+        """The robot's mail, None where there is no place for it."""
+        reason = self._places.admit(robot, now_ns, readable=readable, waiting=self._mail)
+        if reason is not None:
+            self._turned_away[reason] += 1
+            return None
+        mail = self._mail.get(robot)
+        if mail is None:
+            mail = self._mail[robot] = Mail(robot)
+        return mail
+
+    def _put(self, mail: Mail, letter: Letter) -> bool:
+        box, sooner = self._box(mail, letter.topic, letter.arrived_ns)
+        before = _weight(box.kept)
+        if self._bytes + len(letter.data) - before > self._max_bytes:
+            box.refuse(OVERFLOW, _too_fast)
+        else:
+            box.put(letter)
+            self._bytes += _weight(box.kept) - before
+        return sooner
+
+    def _token(self, mail: Mail, boot: str, alive: bool, now_ns: int) -> bool:
+        sooner = not mail.tokens and self._stand("token", mail.robot, now_ns)
+        if boot in mail.tokens or len(mail.tokens) < MAX_TOKENS:
+            # Taken out first, so that the order of the dictionary is that of arrival.
+            mail.tokens.pop(boot, None)
+            mail.tokens[boot] = alive
+        return sooner
+
+    def _box(self, mail: Mail, topic: Topic, arrived_ns: int) -> tuple[Box, bool]:
+        """The box of a topic, stamped with an arrival, and whether the loop must be told of it."""
+        box = mail.boxes.get(topic)
+        sooner = False
+        if box is None:
+            box = mail.boxes[topic] = Box()
+            sooner = self._stand(topic, mail.robot, arrived_ns)
+        box.arrived_ns = arrived_ns
+        return box, sooner
+
+    def _stand(self, line: Line, robot: str, now_ns: int) -> bool:
+        due_ns = self._turns[line].stand(robot, now_ns)
+        sooner = self._awaited_ns is None or due_ns < self._awaited_ns
+        if sooner:
+            self._awaited_ns = due_ns
+        return sooner
+
+    def _hand_over(self, line: Line, mail: Mail, handed: Mail) -> None:
+        if line == "token":
+            handed.tokens, mail.tokens = mail.tokens, {}
+        else:
+            box = handed.boxes[line] = mail.boxes.pop(line)
+            self._bytes -= _weight(box.kept)
+        if not mail.boxes and not mail.tokens:
+            del self._mail[mail.robot]
+
+
+def _too_fast() -> str:
+    return "came faster than the station could take it"
 
 
 def _weight(letter: Letter | None) -> int:

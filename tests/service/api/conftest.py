@@ -24,8 +24,8 @@ class Silence:
     def attach(self, wake: object) -> None:
         pass
 
-    def drain(self, limit: int) -> tuple[Iterable[Event], bool]:
-        return (), False
+    def drain(self, limit: int, now_ns: int) -> tuple[Iterable[Event], int | None]:
+        return (), None
 
 
 @dataclass

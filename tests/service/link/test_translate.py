@@ -22,7 +22,7 @@ from tests.service.wall import CAMERA, keyframe_bytes, picture, picture_bytes, p
 def opened(data: bytes, topic: Topic = "keyframe", robot: str = "r1") -> list[Event]:
     boxes = Mailboxes()
     boxes.put(Letter(robot, topic, "b0", 0, data, 77))
-    return [event for mail in boxes.drain(1)[0] for event in events_of(mail)]
+    return [event for mail in boxes.drain(1, 10**9)[0] for event in events_of(mail)]
 
 
 def test_a_keyframe_comes_through_whole() -> None:
@@ -120,8 +120,8 @@ def test_refusals_and_tokens_become_events() -> None:
     boxes.token("r1", "b0", True, 1)
     boxes.token("r1", "old", False, 1)
     for _ in range(3):
-        boxes.refuse("r1", "pose", codec.MALFORMED, "payload: garbage", 2)
-    (mail,), _ = boxes.drain(1)
+        boxes.refuse("r1", "pose", codec.MALFORMED, lambda: "payload: garbage", 2)
+    (mail,), _ = boxes.drain(1, 10**9)
     assert list(events_of(mail)) == [
         TokenSeen("r1", "b0"),
         TokenLost("r1", "old"),
