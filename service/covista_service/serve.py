@@ -10,13 +10,14 @@ import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import uvicorn
 from covista_schemas.errors import CovistaError
 from fastapi import FastAPI
 from starlette.types import Receive, Scope, Send
 
+from covista_service.api.connection import Connection
 from covista_service.api.deps import Parts
 from covista_service.app import create_app
 from covista_service.config import Address, Settings
@@ -68,8 +69,20 @@ async def _serve(
         scope["state"] = dict(state or {})
         await app(scope, receive, send)
 
+    def connection(**given: Any) -> Connection:
+        parts: Parts = (state or {})["parts"]
+        return Connection(**given, given_up=parts.outgoing.given_up)
+
     server = _Server(
-        uvicorn.Config(stateful, lifespan="off", log_config=None, access_log=False, timeout_graceful_shutdown=_GRACE_S)
+        uvicorn.Config(
+            stateful,
+            # Called for each connection like the class that it stands for.
+            http=cast(type[asyncio.Protocol], connection),
+            lifespan="off",
+            log_config=None,
+            access_log=False,
+            timeout_graceful_shutdown=_GRACE_S,
+        )
     )
     # The lifespan is entered here and not by the server, so that what goes wrong comes out as an exception.
     with _stopped_by(_SIGNALS if signals else (), server.stop):

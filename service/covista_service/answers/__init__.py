@@ -7,6 +7,7 @@ from covista_service.answers.grouping import (
     own_group_report,
     similarity_report,
 )
+from covista_service.answers.matrices import similarity_json
 from covista_service.answers.pairs import common_regions, explaining_survey, find_pair, pair_report, pairs_report
 from covista_service.answers.robots import find_robot, robot_report, robots_report
 from covista_service.answers.unknown import NotKnownError, problem_of
@@ -26,5 +27,6 @@ __all__ = [
     "problem_of",
     "robot_report",
     "robots_report",
+    "similarity_json",
     "similarity_report",
 ]

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, TypedDict
 
 from covista_schemas.keys import ID_PATTERN
 from covista_schemas.reports import Health, Report
 from fastapi import Depends, Path, Request, Response
 
+from covista_service.api.delivery import deliver
+from covista_service.api.outgoing import Outgoing
 from covista_service.api.vitals import Vitals
 from covista_service.loop import Loop
 from covista_service.station.census import Census
@@ -29,6 +31,7 @@ class Parts:
     health: Callable[[], Health]
     vitals: Callable[[], Vitals]
     name: str
+    outgoing: Outgoing = field(default_factory=Outgoing)
 
 
 class State(TypedDict):
@@ -61,16 +64,29 @@ SnapshotNow = Annotated[Snapshot, Depends(snapshot_of)]
 RobotPath = Annotated[str, Path(pattern=f"^{ID_PATTERN}$", description="Id of a robot.", examples=["r1"])]
 
 
-def answer(report: Report) -> Response:
-    """A report as it is: it was checked when it was made."""
-    return Response(report.model_dump_json(), media_type=JSON)
+def answer(report: Report, outgoing: Outgoing | None = None) -> Response:
+    """A report as it is: it was checked when it was made. One that may be large wants `outgoing`."""
+    text = report.model_dump_json()
+    return Response(text, media_type=JSON) if outgoing is None else deliver(text.encode(), outgoing, JSON)
 
 
 def answer_unless_known(request: Request, tag: str, build: Callable[[], Response]) -> Response:
     """304 for who has this version already (RFC 9110, If-None-Match), else what `build` makes, with its tag."""
-    etag = f'"{hashlib.blake2s(tag.encode(), digest_size=12).hexdigest()}"'
+    return tagged(Response(status_code=304) if is_known(request, tag) else build(), tag)
+
+
+def is_known(request: Request, tag: str) -> bool:
+    """Does who asks say that they have this version already?"""
     known = [each.strip().removeprefix("W/") for each in request.headers.get("if-none-match", "").split(",")]
-    response = Response(status_code=304) if etag in known or known == ["*"] else build()
-    response.headers["ETag"] = etag
+    return _etag(tag) in known or known == ["*"]
+
+
+def tagged(response: Response, tag: str) -> Response:
+    """The answer, with its version."""
+    response.headers["ETag"] = _etag(tag)
     response.headers["Vary"] = "Accept"
     return response
+
+
+def _etag(tag: str) -> str:
+    return f'"{hashlib.blake2s(tag.encode(), digest_size=12).hexdigest()}"'

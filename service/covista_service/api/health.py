@@ -9,6 +9,7 @@ from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from covista_service.api import examples
 from covista_service.api.deps import CensusNow, PartsNow, answer
 from covista_service.api.metrics import of_station
+from covista_service.api.outgoing_metrics import of_outgoing
 
 router = APIRouter(tags=["health"])
 _WORKING = ("ready", "degraded")
@@ -30,4 +31,5 @@ def metrics(parts: PartsNow, census: CensusNow) -> Response:
     """Counts and latencies for Prometheus."""
     now = of_station(census, parts.vitals(), parts.health())
     text = generate_latest(parts.telemetry.registry) + generate_latest(now)
+    text += generate_latest(of_outgoing(parts.outgoing))
     return Response(text, media_type=CONTENT_TYPE_LATEST)

@@ -10,7 +10,7 @@ from fastapi import APIRouter, Query, Response
 from covista_service import answers
 from covista_service.answers import NotKnownError
 from covista_service.api import examples
-from covista_service.api.deps import RobotPath, SnapshotNow, answer
+from covista_service.api.deps import PartsNow, RobotPath, SnapshotNow, answer
 from covista_service.api.errors import describe
 from covista_service.drawing import CommonField, overlay
 from covista_service.station.snapshot import PairView
@@ -27,9 +27,9 @@ ShareQuery = Annotated[
 
 
 @router.get("", response_model=PairsReport, responses={**examples.show(examples.PAIRS), **describe(404)})
-def pairs(snapshot: SnapshotNow, robot: RobotQuery = None, min_overlap: ShareQuery = None) -> Response:
+def pairs(parts: PartsNow, snapshot: SnapshotNow, robot: RobotQuery = None, min_overlap: ShareQuery = None) -> Response:
     """All pairs, each unordered pair once."""
-    return answer(answers.pairs_report(snapshot, robot, min_overlap))
+    return answer(answers.pairs_report(snapshot, robot, min_overlap), parts.outgoing)
 
 
 @router.get("/{a}/{b}", response_model=PairReport, responses={**examples.show(examples.PAIR), **describe(404)})

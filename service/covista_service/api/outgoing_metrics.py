@@ -1,0 +1,33 @@
+"""What Prometheus is told of answers under way, of those that were refused, and of connections that were cut."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from prometheus_client import CollectorRegistry
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client.registry import Collector
+
+from covista_service.api.outgoing import Outgoing
+
+
+def of_outgoing(outgoing: Outgoing) -> CollectorRegistry:
+    """A registry of what is on its way to clients."""
+    registry = CollectorRegistry()
+    registry.register(_Answers(outgoing))
+    return registry
+
+
+class _Answers(Collector):
+    def __init__(self, outgoing: Outgoing) -> None:
+        self._outgoing = outgoing
+
+    def collect(self) -> Iterator[Metric]:
+        held = self._outgoing.held_bytes
+        yield GaugeMetricFamily("covista_answers_bytes", "Bytes of large answers under way, each once.", value=held)
+        given_up = CounterMetricFamily(
+            "covista_clients_given_up", "Answers refused and connections cut, by reason.", labels=["reason"]
+        )
+        for reason, count in dict(self._outgoing.given_up).items():
+            given_up.add_metric([reason], count)
+        yield given_up
