@@ -2,6 +2,9 @@
 
 The last value of each key is kept for advanced subscribers that come late. A thread of its own puts, so that a slow
 peer costs the loop nothing; where it cannot keep up, only the newest value of a key goes out.
+
+What a subscriber does not take is dropped for that subscriber alone, once it has held up the others for as long as
+`session.WAIT_US`. (Blocking, zenoh waits five seconds for one that is stopped, and everybody else with it.)
 """
 
 from __future__ import annotations
@@ -111,7 +114,7 @@ class Publisher:
                 cache=ext.CacheConfig(1),
                 publisher_detection=True,
                 encoding=zenoh.Encoding.APPLICATION_JSON,
-                congestion_control=zenoh.CongestionControl.BLOCK,
+                congestion_control=zenoh.CongestionControl.DROP,
             )
         self._publishers[key].put(text)
 

@@ -9,6 +9,11 @@ import zenoh
 from covista_schemas.errors import LinkError
 from covista_schemas.zenoh_config import config
 
+# Bursts may wait so long for a link that is busy. One on which a message was dropped is not waited for again until it
+# moves.
+WAIT_US = 50_000
+_DROP = "transport/link/tx/queue/congestion_control/drop"
+
 # zenoh's messages end in places of its own source code.
 _PLACE = re.compile(r" at /\S+|[\[\]]")
 
@@ -16,6 +21,8 @@ _PLACE = re.compile(r" at /\S+|[\[\]]")
 def open_session(listen: Sequence[str], connect: Sequence[str]) -> zenoh.Session:
     """Listen and join. Raises LinkError, whose text names the end points and the flag to change them."""
     made = config("router", listen=listen, connect=connect)
+    made.insert_json5(f"{_DROP}/wait_before_drop", str(WAIT_US))
+    made.insert_json5(f"{_DROP}/max_wait_before_drop_fragments", str(2 * WAIT_US))
     try:
         return zenoh.open(made)
     except zenoh.ZError as error:
