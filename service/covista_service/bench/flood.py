@@ -104,13 +104,11 @@ def garbage(session: zenoh.Session, robots: int) -> Make:
     chance = random.Random(0)
     kinds = cycle(
         [
-            _same(session, [keys.pose(SITE, f"b{n + 1}") for n in range(robots)], chance.randbytes(_NOISE_BYTES)),
-            _same(session, [keys.keyframe(SITE, f"x{n}") for n in range(_NAMES)], chance.randbytes(_NOISE_BYTES)),
-            _same(
-                session, [keys.pose(SITE, f"b{n + 1}") for n in range(robots)], _pose("somebody").SerializeToString()
-            ),
+            _same([keys.pose(SITE, f"b{n + 1}") for n in range(robots)], chance.randbytes(_NOISE_BYTES)),
+            _same([keys.keyframe(SITE, f"x{n}") for n in range(_NAMES)], chance.randbytes(_NOISE_BYTES)),
+            _same([keys.pose(SITE, f"b{n + 1}") for n in range(robots)], _pose("somebody").SerializeToString()),
             _wrong(session, robots),
-            _same(session, [keys.pose(SITE, "long")], bytes(codec.MAX_POSE_BYTES + 1)),
+            _same([keys.pose(SITE, "long")], bytes(codec.MAX_POSE_BYTES + 1)),
         ]
     )
     return lambda _number: next(next(kinds))
@@ -126,9 +124,9 @@ def _wrong(session: zenoh.Session, robots: int) -> Iterator[Message]:
         sequence += 1
 
 
-def _same(session: zenoh.Session, names: list[str], data: bytes) -> Iterator[Message]:
+def _same(names: list[str], data: bytes) -> Iterator[Message]:
     """The same bytes under each of the keys."""
-    return cycle([(session.declare_keyexpr(name), data) for name in names])
+    return cycle([(zenoh.KeyExpr(name), data) for name in names])
 
 
 def _pose(robot: str) -> pb.Pose:

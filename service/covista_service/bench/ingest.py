@@ -104,12 +104,12 @@ def _costs(quiet: Run, flooded: Run, dirty: Run) -> Iterator[Row]:
     )
 
 
-def raw_rate() -> float:
+def raw_rate(seconds: float = _RAW_SECONDS) -> float:
     """Poses a second that a subscriber can count that does nothing else."""
     endpoint = free_endpoint()
     with ExitStack() as stack:
         listener = _start(stack, raw_subscriber.__name__, endpoint)
-        flooder = _start(stack, flood.__name__, FloodOptions(endpoint, _RAW_SECONDS, robots=ROBOTS))
+        flooder = _start(stack, flood.__name__, FloodOptions(endpoint, seconds, robots=ROBOTS))
         flooder.line.send("go")
         flooded = expect(flooder, Flooded)
         listener.line.send("count")

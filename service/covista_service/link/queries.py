@@ -9,7 +9,7 @@ from typing import Any
 import zenoh
 from covista_schemas import keys
 from covista_schemas.errors import KeyExpressionError
-from covista_schemas.reports import Problem, Report
+from covista_schemas.reports import Problem
 
 from covista_service import answers
 from covista_service.answers import NotKnownError
@@ -39,7 +39,7 @@ class Queries:
         key = str(query.key_expr)
         with query:
             try:
-                report = answer(self._ask(), self._site, key)
+                text = answer(self._ask(), self._site, key)
             except NotKnownError as error:
                 _refuse(query, answers.problem_of(error, key))
             except KeyExpressionError as error:
@@ -47,20 +47,20 @@ class Queries:
             except TimeoutError:
                 _refuse(query, Problem(title="The station is busy", status=503, instance=key))
             else:
-                query.reply(key, report.model_dump_json(), encoding=zenoh.Encoding.APPLICATION_JSON)
+                query.reply(key, text, encoding=zenoh.Encoding.APPLICATION_JSON)
 
 
-def answer(snapshot: Snapshot, site: str, key: str) -> Report:
-    """What the station says to a query on this key. Raises NotKnownError or KeyExpressionError."""
+def answer(snapshot: Snapshot, site: str, key: str) -> bytes | str:
+    """What the station says to a query on this key, as JSON. Raises NotKnownError or KeyExpressionError."""
     match keys.parse_station_query(site, key):
         case keys.StationQuery("groups"):
-            return answers.groups_report(snapshot)
+            return answers.groups_report(snapshot).model_dump_json()
         case keys.StationQuery("similarity"):
-            return answers.similarity_report(snapshot)
+            return b"".join(answers.similarity_json(snapshot))
         case keys.StationQuery("pairs", (a, b)):
-            return answers.pair_report(snapshot, a, b)
+            return answers.pair_report(snapshot, a, b).model_dump_json()
         case keys.StationQuery(_, ids):
-            return answers.robot_report(snapshot, ids[0])
+            return answers.robot_report(snapshot, ids[0]).model_dump_json()
 
 
 def _refuse(query: zenoh.Query, problem: Problem) -> None:

@@ -1,0 +1,79 @@
+from collections.abc import Iterator
+
+import pytest
+import zenoh
+from covista_schemas import codec, keys
+from covista_schemas.errors import DecodeError
+from covista_schemas.zenoh_config import config
+from covista_service.bench import flood, ingest
+from covista_service.bench.ingest import Run
+from covista_service.demo import children
+
+from tests.service.deadline import free_endpoint
+
+
+@pytest.fixture(scope="module")
+def session() -> Iterator[zenoh.Session]:
+    with zenoh.open(config("router", listen=[free_endpoint()])) as opened:
+        yield opened
+
+
+def test_a_flood_of_poses_is_of_good_poses_numbered_one_by_one(session: zenoh.Session) -> None:
+    make = flood.poses(session, 3)
+    seen: dict[str, list[int]] = {}
+    for number in [*range(600), 3 * 2**33]:
+        key, data = make(number)
+        robot = keys.parse_robot_key(str(key)).robot
+        pose = codec.decode_pose(data, robot=robot)
+        seen.setdefault(robot, []).append(pose.sequence)
+        assert pose.pose.position_m == pytest.approx((0.001 * (pose.sequence % 10_000), 0.0, 1.0))
+    assert seen == {"f1": [*range(200), 2**33], "f2": [*range(200)], "f3": [*range(200)]}
+
+
+def test_none_of_the_garbage_is_any_good_and_all_kinds_are_there(session: zenoh.Session) -> None:
+    make = flood.garbage(session, 2)
+    codes = set()
+    for number in range(500):
+        key, data = make(number)
+        robot = keys.parse_robot_key(str(key)).robot
+        decode = codec.decode_pose if str(key).endswith("pose") else codec.decode_keyframe
+        with pytest.raises(DecodeError) as refused:
+            decode(data, robot=robot)
+        codes.add(refused.value.code)
+    assert codes == {codec.MALFORMED, codec.WRONG_ID, codec.BAD_POSE, codec.TOO_LARGE}
+
+
+def test_every_message_of_a_flood_is_accounted_for() -> None:
+    run = ingest.under_flood(3.0, "poses", 3000, robots=2)
+    assert run.accounted
+    assert run.sent > 0
+    assert run.p50_ms > 0
+
+
+def test_garbage_spoils_no_accounts_of_those_it_is_sent_beside() -> None:
+    run = ingest.under_flood(3.0, "garbage", 2000, robots=2)
+    assert run.accounted
+    assert run.p50_ms > 0
+
+
+def test_a_raw_subscriber_counts_what_is_sent() -> None:
+    assert ingest.raw_rate(0.5) > 0
+
+
+def test_a_flood_ends_with_its_parent() -> None:
+    endpoint = free_endpoint()
+    with zenoh.open(config("router", listen=[endpoint])):
+        flooder = children.start(flood.__name__, flood.FloodOptions(endpoint, 60.0))
+        assert flooder.line.receive() == "ready"
+        flooder.line.send("go")
+        flooder.end()
+        assert flooder.process.returncode is not None
+
+
+@pytest.mark.parametrize(("spent_s", "quiet_s", "us"), [(3.0, 1.0, 200.0), (None, 1.0, None), (1.0, None, None)])
+def test_what_a_message_costs_is_what_is_spent_beyond_quiet(
+    spent_s: float | None, quiet_s: float | None, us: float | None
+) -> None:
+    flooded, quiet = Run(1.0, (), 10_000, spent_s), Run(1.0, cpu_s=quiet_s)
+    assert flooded.cost_us(quiet) == us
+    assert quiet.cost_us(quiet) is None
