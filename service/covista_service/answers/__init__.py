@@ -7,8 +7,8 @@ from covista_service.answers.grouping import (
     own_group_report,
     similarity_report,
 )
-from covista_service.answers.matrices import similarity_json
 from covista_service.answers.pairs import common_regions, explaining_survey, find_pair, pair_report, pairs_report
+from covista_service.answers.pieces import pairs_json, similarity_json
 from covista_service.answers.robots import find_robot, robot_report, robots_report
 from covista_service.answers.unknown import NotKnownError, problem_of
 
@@ -23,6 +23,7 @@ __all__ = [
     "groups_report",
     "own_group_report",
     "pair_report",
+    "pairs_json",
     "pairs_report",
     "problem_of",
     "robot_report",

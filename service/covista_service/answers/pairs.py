@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import lru_cache
 from typing import Literal
 
@@ -24,14 +25,22 @@ _DECIMALS_PX = 2
 
 def pairs_report(snapshot: Snapshot, robot: str | None = None, min_overlap: float | None = None) -> reports.PairsReport:
     """All pairs, or those of one robot, or those where one sees at least this share of the other's image."""
+    return reports.PairsReport(pairs=list(pair_summaries(snapshot, robot, min_overlap)))
+
+
+def pair_summaries(
+    snapshot: Snapshot, robot: str | None = None, min_overlap: float | None = None
+) -> Iterator[reports.PairSummary]:
+    """What `pairs_report` lists, one by one: of a thousand robots they are half a million. Raises NotKnownError."""
     if robot is None:
-        views = list(snapshot.pairs())
+        views = snapshot.pairs()
     else:
         find_robot(snapshot, robot)
-        views = [snapshot.pair(robot, other) for other in snapshot.robots if other != robot]
+        views = (snapshot.pair(robot, other) for other in snapshot.robots if other != robot)
     least = min_overlap or 0.0
-    seen = [view for view in views if max(view.overlap_a or 0.0, view.overlap_b or 0.0) >= least]
-    return reports.PairsReport(pairs=[reports.PairSummary.model_validate(_pair(view, "a")) for view in seen])
+    for view in views:
+        if max(view.overlap_a or 0.0, view.overlap_b or 0.0) >= least:
+            yield reports.PairSummary.model_validate(_pair(view, "a"))
 
 
 def find_pair(snapshot: Snapshot, a: str, b: str) -> PairView:

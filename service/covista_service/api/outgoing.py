@@ -7,7 +7,7 @@ many bytes are still on their way to clients that read slowly, others get the ne
 from __future__ import annotations
 
 import asyncio
-from collections import Counter
+from collections import Counter, OrderedDict
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
@@ -15,6 +15,8 @@ from dataclasses import dataclass, field
 MAX_BYTES = 256 * 1024 * 1024
 # Given to the connection at a time; more of it waits here, shared, and not in each connection's buffer.
 CHUNK_BYTES = 128 * 1024
+# Answers kept for who asks next.
+_KINDS = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,8 +56,8 @@ class Outgoing:
         self._making = asyncio.Lock()
         self._sending = asyncio.Lock()
         self._begun = 0
-        self._newest: Body | None = None
-        self._newest_begun = 0
+        # The newest of each kind, and as which answer it was begun.
+        self._newest: OrderedDict[str, tuple[int, Body]] = OrderedDict()
         # Answers refused and connections cut, by reason.
         self.given_up: Counter[str] = Counter()
 
@@ -86,21 +88,25 @@ class Outgoing:
         async with self._sending:
             await asyncio.sleep(0)
 
-    async def share(self, tag: Callable[[], str], make: Callable[[], Callable[[], Iterable[bytes]]]) -> Body:
-        """The answer with the `tag` of now, made in another thread unless it is there, one at a time.
+    async def share(self, kind: str, tag: Callable[[], str], make: Callable[[], Callable[[], Iterable[bytes]]]) -> Body:
+        """The answer of a kind with the `tag` of now, made in another thread unless it is there, one at a time.
 
         `make` is called here and gives what makes it there. Who waits while another is made gets the next, or that one
-        if it was begun after he came; where too much is on its way, the newest there is.
+        if it was begun after he came; where too much is on its way, the newest there is. An empty tag is like no other.
         """
         came = self._begun
         async with self._making:
-            newest, wanted = self._newest, tag()
-            if newest is not None and (newest.tag == wanted or self._newest_begun > came or self._crowded(newest)):
+            number, newest = self._newest.get(kind, (0, None))
+            wanted = tag()
+            if newest is not None and (number > came or newest.tag == wanted != "" or self._crowded(newest)):
                 return newest
             self._begun = begun = self._begun + 1
             pieces = make()
             body = await asyncio.to_thread(lambda: body_of(pieces(), wanted))
-            self._newest, self._newest_begun = body, begun
+            self._newest[kind] = begun, body
+            self._newest.move_to_end(kind)
+            while len(self._newest) > _KINDS:
+                self._newest.popitem(last=False)
             return body
 
     def _crowded(self, newest: Body) -> bool:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+from functools import partial
 from typing import Annotated, Any, Literal
 
 from covista_schemas.reports import PairReport, PairsReport
@@ -10,7 +12,8 @@ from fastapi import APIRouter, Query, Response
 from covista_service import answers
 from covista_service.answers import NotKnownError
 from covista_service.api import examples
-from covista_service.api.deps import PartsNow, RobotPath, SnapshotNow, answer
+from covista_service.api.delivery import Delivery
+from covista_service.api.deps import JSON, PartsNow, RobotPath, SnapshotNow, answer
 from covista_service.api.errors import describe
 from covista_service.drawing import CommonField, overlay
 from covista_service.station.snapshot import PairView
@@ -27,9 +30,16 @@ ShareQuery = Annotated[
 
 
 @router.get("", response_model=PairsReport, responses={**examples.show(examples.PAIRS), **describe(404)})
-def pairs(parts: PartsNow, snapshot: SnapshotNow, robot: RobotQuery = None, min_overlap: ShareQuery = None) -> Response:
+async def pairs(
+    parts: PartsNow, snapshot: SnapshotNow, robot: RobotQuery = None, min_overlap: ShareQuery = None
+) -> Response:
     """All pairs, each unordered pair once."""
-    return answer(answers.pairs_report(snapshot, robot, min_overlap), parts.outgoing)
+    if robot is not None:
+        return answer(await asyncio.to_thread(answers.pairs_report, snapshot, robot, min_overlap))
+    body = await parts.outgoing.share(
+        f"pairs {min_overlap}", lambda: "", lambda: partial(answers.pairs_json, parts.loop.snapshot(), min_overlap)
+    )
+    return Delivery(body, parts.outgoing, JSON)
 
 
 @router.get("/{a}/{b}", response_model=PairReport, responses={**examples.show(examples.PAIR), **describe(404)})

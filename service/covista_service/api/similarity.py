@@ -24,5 +24,7 @@ async def similarity(request: Request, parts: PartsNow) -> Response:
 
     if is_known(request, tag()):
         return tagged(Response(status_code=304), tag())
-    body = await parts.outgoing.share(tag, lambda: partial(answers.similarity_json, parts.loop.snapshot()))
+    body = await parts.outgoing.share(
+        "similarity", tag, lambda: partial(answers.similarity_json, parts.loop.snapshot())
+    )
     return tagged(Delivery(body, parts.outgoing, JSON), body.tag)

@@ -28,9 +28,10 @@ class Press:
     made: list[int] = field(default_factory=list)
     let: threading.Event = field(default_factory=threading.Event)
     size: int = 10
+    kind: str = "matrix"
 
     def order(self) -> Awaitable[Body]:
-        return self.outgoing.share(lambda: f"v{self.version}", self._make)
+        return self.outgoing.share(self.kind, lambda: f"v{self.version}", self._make)
 
     def _make(self) -> Callable[[], Iterable[bytes]]:
         version = self.version
@@ -80,6 +81,46 @@ def test_what_is_current_is_made_once_and_what_is_not_is_made_anew() -> None:
     asyncio.run(scenario())
 
 
+def test_of_two_kinds_each_has_its_own_and_of_many_few_are_kept() -> None:
+    async def scenario() -> None:
+        press = Press()
+        press.let.set()
+        bodies = {}
+        for kind in ("a", "b"):
+            press.kind = kind
+            bodies[kind] = await press.order()
+            assert await press.order() is bodies[kind]
+        assert bodies["a"] is not bodies["b"]
+        for number in range(10):
+            press.kind = f"c{number}"
+            await press.order()
+        press.kind = "a"
+        assert await press.order() is not bodies["a"]
+        assert len(press.outgoing._newest) <= 2
+
+    asyncio.run(scenario())
+
+
+def test_what_has_no_version_is_shared_by_those_who_wait_and_by_nobody_else() -> None:
+    async def scenario() -> None:
+        press, outgoing = Press(), Outgoing()
+
+        def order() -> Awaitable[Body]:
+            return outgoing.share("pairs", str, press._make)
+
+        first = asyncio.ensure_future(order())
+        await turn()
+        others = [asyncio.ensure_future(order()) for _ in range(10)]
+        await turn()
+        press.let.set()
+        bodies = await asyncio.gather(first, *others)
+        assert len(set(map(id, bodies))) == 2
+        assert await order() not in bodies
+        assert press.made == [0, 0, 0]
+
+    asyncio.run(scenario())
+
+
 def test_a_failure_is_the_one_s_who_asked_and_the_next_is_tried_again() -> None:
     async def scenario() -> None:
         press = Press()
@@ -89,7 +130,7 @@ def test_a_failure_is_the_one_s_who_asked_and_the_next_is_tried_again() -> None:
             raise ZeroDivisionError
 
         with pytest.raises(ZeroDivisionError):
-            await press.outgoing.share(lambda: "v0", broken)
+            await press.outgoing.share("matrix", lambda: "v0", broken)
         assert (await press.order()).tag == "v0"
 
     asyncio.run(scenario())

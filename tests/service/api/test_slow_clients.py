@@ -18,7 +18,7 @@ from covista_service.api import delivery
 from covista_service.api.connection import Connection, Patience
 from covista_service.api.outgoing import CHUNK_BYTES
 
-from tests.service.answers.test_matrices import swarm
+from tests.service.answers.test_pieces import swarm
 from tests.service.api.conftest import Desk
 from tests.service.deadline import wait_until
 

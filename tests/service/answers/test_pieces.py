@@ -9,6 +9,8 @@ from covista_service.station.station import Station
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.service.station.scenes import Scene
+
 
 def swarm(robots: int, seed: int) -> Snapshot:
     """A station that knows some of the overlaps of so many robots."""
@@ -36,3 +38,14 @@ def test_what_is_unknown_is_null_and_the_model_reads_it(robots: int) -> None:
 def test_no_piece_is_longer_than_a_row() -> None:
     pieces = list(answers.similarity_json(swarm(50, 2)))
     assert max(map(len, pieces)) < 50 * 25
+
+
+@pytest.mark.parametrize("robots", [0, 1, 2, 5])
+@pytest.mark.parametrize("min_overlap", [None, 0.0, 0.3, 1.0])
+def test_pairs_in_pieces_are_those_of_the_report(robots: int, min_overlap: float | None) -> None:
+    scene = Scene()
+    for number in range(robots):
+        scene.send(f"r{number}")
+    scene.settle()
+    text = b"".join(answers.pairs_json(scene.snapshot, min_overlap))
+    assert text.decode() == answers.pairs_report(scene.snapshot, None, min_overlap).model_dump_json()

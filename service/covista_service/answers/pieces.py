@@ -1,4 +1,7 @@
-"""The matrices as text, row by row: a million numbers at once would keep the interpreter from everybody else."""
+"""What is large, as text in pieces: a million numbers at once would keep the interpreter from everybody else.
+
+For a thread of its own, which lets go of the interpreter after each piece.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +10,15 @@ from collections.abc import Iterator
 
 from pydantic_core import to_json
 
+from covista_service.answers.pairs import pair_summaries
 from covista_service.grouping.similarity import Floats
 from covista_service.station.snapshot import Snapshot
 
+_PAIRS_AT_A_TIME = 20
+
 
 def similarity_json(snapshot: Snapshot) -> Iterator[bytes]:
-    """The report of the matrices as JSON, in pieces; unknown overlaps are null. For a thread of its own."""
+    """`similarity_report` as JSON; unknown overlaps are null."""
     view = snapshot.similarity
     yield b'{"revision":%d,"robots":%b' % (view.revision, to_json(view.robots))
     for name, matrix in (
@@ -25,6 +31,17 @@ def similarity_json(snapshot: Snapshot) -> Iterator[bytes]:
         yield from _rows(matrix)
         yield b"]"
     yield b"}"
+
+
+def pairs_json(snapshot: Snapshot, min_overlap: float | None = None) -> Iterator[bytes]:
+    """`pairs_report` of all robots as JSON."""
+    yield b'{"pairs":['
+    for count, summary in enumerate(pair_summaries(snapshot, None, min_overlap)):
+        text = summary.model_dump_json().encode()
+        yield b"," + text if count else text
+        if count % _PAIRS_AT_A_TIME == 0:
+            time.sleep(0)
+    yield b"]}"
 
 
 def _rows(matrix: Floats) -> Iterator[bytes]:
