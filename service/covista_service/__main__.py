@@ -52,7 +52,7 @@ def serve(
     ] = None,
     database: Annotated[str | None, typer.Option(metavar="URL", help="History. [sqlite:///covista.db]")] = None,
     workers: Annotated[
-        str | None, typer.Option(metavar="threads|processes", help="Where surveys run. [threads]")
+        str | None, typer.Option(metavar="threads|processes|dask://HOST:PORT", help="Where surveys run. [threads]")
     ] = None,
     insecure: Annotated[
         bool, typer.Option("--insecure", help="Listen beyond this machine without access control.")

@@ -24,13 +24,13 @@ from covista_service.link.mailbox import Mailboxes
 from covista_service.link.publish import Publisher
 from covista_service.link.queries import Queries
 from covista_service.link.session import open_session
-from covista_service.loop import CrewStatus, Loop
+from covista_service.loop import Loop
 from covista_service.station.options import GroupingOptions, StationOptions
 from covista_service.station.station import Station
 from covista_service.store.database import check_url
 from covista_service.store.history import History
 from covista_service.telemetry import Telemetry, about
-from covista_service.workers import Workers, WorkersOptions
+from covista_service.workers import Workers, WorkersOptions, check_kind
 
 log = logging.getLogger(__name__)
 
@@ -39,9 +39,13 @@ _SILENT_S = 2.0
 
 
 def create_app(settings: Settings) -> FastAPI:
-    """The station as an ASGI application; its lifespan opens and closes all. Raises AccessError or DatabaseError."""
+    """The station as an ASGI application; its lifespan opens and closes all.
+
+    Raises AccessError, DatabaseError or MissingExtraError.
+    """
     check_listening(settings.api_address.host, settings.link, insecure=settings.insecure)
     check_url(settings.database)
+    check_kind(settings.workers)
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[State]:
@@ -67,7 +71,7 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
         close_later(publisher.close)
         history = await asyncio.to_thread(History, settings.database)
         close_later(history.close)
-        workers = Workers(WorkersOptions(settings.workers, settings.workers_count))
+        workers = await asyncio.to_thread(Workers, WorkersOptions(settings.workers, settings.workers_count))
         close_later(workers.close)
         telemetry = Telemetry()
         loop = Loop(
@@ -91,7 +95,7 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
         def vitals_now() -> Vitals:
             return Vitals(
                 mail=mailboxes.depths(),
-                crew=CrewStatus(settings.workers, workers.capacity, workers.warm),
+                crew=workers.status(),
                 sinks={"zenoh": publisher.status(), "history": history.status()},
                 turned_away=mailboxes.turned_away,
                 sessions=len(session.info.transports()),
@@ -118,10 +122,13 @@ async def _end(task: asyncio.Task[None]) -> None:
 
 
 def _crew_health(workers: Workers, kind: str) -> PartHealth:
-    crew = f"{workers.capacity} {kind}"
+    crew = workers.status()
+    detail = f"{crew.capacity} at {kind}" if crew.kind == "dask" else f"{crew.capacity} {kind}"
     if not workers.warm:
-        return PartHealth(status="starting", detail=f"{crew}, loading compiled code")
-    return PartHealth(status="ready", detail=crew)
+        return PartHealth(status="starting", detail=f"{detail}, loading compiled code")
+    if crew.fallback is not None:
+        return PartHealth(status="degraded", detail=crew.fallback)
+    return PartHealth(status="ready", detail=detail if crew.remark is None else f"{detail}; {crew.remark}")
 
 
 def _loop_health(loop: Loop, task: asyncio.Task[None]) -> PartHealth:

@@ -63,6 +63,14 @@ def _check_database(text: str) -> str:
     return text
 
 
+def _check_workers(text: str) -> str:
+    if text in ("threads", "processes"):
+        return text
+    if not re.fullmatch(r"dask://[^\s/@?#]+:[0-9]{1,5}", text) or parse_address(text.removeprefix("dask://")).port == 0:
+        raise ValueError(f"{text!r} is not threads, processes or dask://HOST:PORT")
+    return text
+
+
 def _split(value: object) -> object:
     return [part.strip() for part in value.split(",") if part.strip()] if isinstance(value, str) else value
 
@@ -94,8 +102,12 @@ class Settings(LiveSettings, BaseSettings):
     database: Annotated[str, AfterValidator(_check_database)] = Field(
         default="sqlite:///covista.db", description="URL of the database for the history."
     )
-    workers: Literal["threads", "processes"] = Field(default="threads", description="Where surveys run.")
-    workers_count: int = Field(default=2, ge=1, le=256, description="How many surveys run at a time.")
+    workers: Annotated[str, AfterValidator(_check_workers)] = Field(
+        default="threads", description="Where surveys run: threads, processes, or a cluster as dask://HOST:PORT."
+    )
+    workers_count: int = Field(
+        default=2, ge=1, le=256, description="How many surveys run at a time; of a cluster, while it is away."
+    )
     insecure: bool = Field(default=False, description="Listen beyond loopback without access control.")
     log_level: Literal["debug", "info", "warning", "error"] = Field(default="info", description="Least level to log.")
     log_format: Literal["text", "json"] = Field(default="text", description="A line of words, or a JSON object.")

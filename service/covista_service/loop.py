@@ -78,16 +78,23 @@ class Source(Protocol):
 class CrewStatus:
     """How those are who do the heavy work: `capacity` jobs at a time, by `kind` (threads, processes, dask).
 
-    `fallback` says why they work here and not where they should, None if they do; `lost` workers died since the start,
-    and `retried` jobs had to be done again for it.
+    `fallback` says why they work here and not where they should, None if they do; `remark` is what else a person should
+    know. Since the start, `lost` workers died or went away, `retried` jobs had to be done again, `overdue` ones did not
+    return in time, and `given_up` ones failed for having done so again. `shipped_bytes` of features went to workers;
+    `shipped_again` times those that were lost there.
     """
 
     kind: str
     capacity: int
     warm: bool = True
     fallback: str | None = None
+    remark: str | None = None
     lost: int = 0
     retried: int = 0
+    overdue: int = 0
+    given_up: int = 0
+    shipped_bytes: int = 0
+    shipped_again: int = 0
 
 
 class Crew(Protocol):
@@ -101,6 +108,9 @@ class Crew(Protocol):
 
     def build(self, job: BuildSurfaces) -> Future[Built]:
         """Settle poses and surfaces."""
+
+    def status(self) -> CrewStatus:
+        """How they are; asked every turn."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,6 +168,7 @@ class Loop:
         self._asyncio: asyncio.AbstractEventLoop | None = None
         self._turned_ns = clock()
         self._next_ns: int | None = None
+        self._capacity = station.options.capacity
 
     async def run(self) -> None:
         """Turn until cancelled: when there is something to do, and every quarter of a second."""
@@ -186,6 +197,7 @@ class Loop:
         began_ns, self._next_ns = self._clock(), None
         events, self._next_ns = self._source.drain(BATCH, began_ns)
         effects: list[Effect] = []
+        self._resize()
         results = [self._results.popleft() for _ in range(len(self._results))]
         for event in itertools.chain(results, events, (Tick(),)):
             effects += self._receive(event)
@@ -234,6 +246,13 @@ class Loop:
         if self._next_ns is None:
             return rest_s
         return min(rest_s, max(0.0, (self._next_ns - self._clock()) / _NS_PER_S))
+
+    def _resize(self) -> None:
+        """Workers come and go: never more is under way than they can take."""
+        capacity = self._crew.status().capacity
+        if capacity != self._capacity:
+            self._capacity = capacity
+            self._station.resize(capacity)
 
     def _receive(self, event: Event) -> Sequence[Effect]:
         self._count(event)

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from concurrent.futures import Future
 
-from covista_service.loop import Built, Extraction
+from covista_service.loop import Built, CrewStatus, Extraction
 from covista_service.perception.comparison import Comparison, ComparisonOptions, compare
 from covista_service.perception.scene import SceneOptions
 from covista_service.station.events import BuildSurfaces, Keyframe, SurveyPair
@@ -17,6 +17,7 @@ class Hands:
 
     def __init__(self) -> None:
         self.failure: Exception | None = None
+        self.capacity = 2
 
     def extract(self, keyframe: Keyframe) -> Future[Extraction]:
         return self._done(lambda: (FEATURES, None))
@@ -26,6 +27,9 @@ class Hands:
 
     def build(self, job: BuildSurfaces) -> Future[Built]:
         return self._done(lambda: build(job.sights, job.thumbnails, job.evidence, SceneOptions()))
+
+    def status(self) -> CrewStatus:
+        return CrewStatus("threads", self.capacity)
 
     def _done(self, work: Callable[[], object]) -> Future:
         future: Future = Future()

@@ -50,7 +50,7 @@ class Pose:
     centre_m: Floats
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Features:
     """`kind` (rootsift | orb), `keypoints_px` (n, 2) float32 as detected, `descriptors` (n, 128 | 32) uint8."""
 

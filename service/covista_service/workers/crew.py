@@ -1,0 +1,111 @@
+"""The station's workers, wherever they are."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from covista_service.loop import Built, CrewStatus, Extraction
+from covista_service.perception.comparison import Comparison
+from covista_service.perception.scene import SceneOptions
+from covista_service.perception.warming import warm_up
+from covista_service.station.events import BuildSurfaces, Keyframe, SurveyPair
+from covista_service.workers import jobs
+from covista_service.workers.cluster import Cluster
+from covista_service.workers.jobs import Job
+from covista_service.workers.pool import Pool, cancelled
+from covista_service.workers.processes import Processes
+from covista_service.workers.scheduler import check_kind, scheduler_of
+from covista_service.workers.threads import Threads
+
+_T = TypeVar("_T")
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class WorkersOptions:
+    """`kind` is threads, processes or dask://HOST:PORT; here `count` jobs run at a time, each on one core.
+
+    A cluster has as many workers as it has; `count` threads stand in for it.
+    """
+
+    kind: str = "threads"
+    count: int = 2
+    scene: SceneOptions = field(default_factory=SceneOptions)
+
+
+class Workers:
+    """Whoever does the heavy work, behind one face."""
+
+    def __init__(self, options: WorkersOptions) -> None:
+        """Raises ValueError for another kind, and MissingExtraError."""
+        self._options = options
+        self._lock = threading.Lock()
+        self._closed = False
+        self._pool = _pool(options)
+        # Overlaps are read in this process. Now is better than when the first robot waits.
+        self._loading = ThreadPoolExecutor(1, "covista-loading")
+        self._loaded = self._loading.submit(warm_up)
+        self._loaded.add_done_callback(_tell_failure)
+
+    @property
+    def warm(self) -> bool:
+        """Is compiled code loaded, so that no keyframe has to wait for it?"""
+        return self._loaded.done() and self._pool.status().warm
+
+    @property
+    def capacity(self) -> int:
+        """How many jobs can run at a time, just now."""
+        return self._pool.status().capacity
+
+    def status(self) -> CrewStatus:
+        """How the workers are; cheap, and for any thread."""
+        return self._pool.status()
+
+    def extract(self, keyframe: Keyframe) -> Future[Extraction]:
+        """Decode the keyframe's image and extract its features and a thumbnail.
+
+        Fails with DecodeError where it is no such image. Raises ValueError where there is none.
+        """
+        return self.submit(jobs.extraction_of(keyframe))
+
+    def survey(self, job: SurveyPair) -> Future[Comparison]:
+        """Survey a pair."""
+        return self.submit(jobs.survey_of(job, self._options.scene.comparison))
+
+    def build(self, job: BuildSurfaces) -> Future[Built]:
+        """Settle poses and surfaces."""
+        return self.submit(jobs.building_of(job, self._options.scene))
+
+    def submit(self, job: Job[_T]) -> Future[_T]:
+        """Have any job done; its future fails with what the job raises, or JobLostError."""
+        with self._lock:
+            return cancelled() if self._closed else self._pool.submit(job)
+
+    def close(self) -> None:
+        """Let jobs under way end, and drop those that wait."""
+        with self._lock:
+            self._closed = True
+        self._loading.shutdown(wait=True, cancel_futures=True)
+        self._pool.close()
+
+
+def _pool(options: WorkersOptions) -> Pool:
+    check_kind(options.kind)
+    scheduler = scheduler_of(options.kind)
+    if scheduler is not None:
+        return Cluster(scheduler, options.count)
+    if options.kind == "threads":
+        return Threads(options.count)
+    if options.kind == "processes":
+        return Processes(options.count)
+    raise ValueError(f"no such workers: {options.kind}")
+
+
+def _tell_failure(loading: Future[None]) -> None:
+    if not loading.cancelled() and (failure := loading.exception()) is not None:
+        log.warning("compiled code could not be loaded ahead; the first keyframes will wait for it", exc_info=failure)
