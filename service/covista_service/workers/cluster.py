@@ -22,7 +22,7 @@ from covista_service.workers.threads import Threads
 if TYPE_CHECKING:
     from distributed import Client
 
-_CONNECT_S, _CLOSE_S = 5.0, 3.0
+_CONNECT_S, _CLOSE_S, _END_S = 5.0, 3.0, 8.0
 # Between attempts to connect, the first time and at most.
 _PAUSE_S, _LONGEST_PAUSE_S = 0.5, 10.0
 # Dask tells the world of each connection that it loses; what matters is said here.
@@ -54,7 +54,7 @@ class Cluster:
         self._begun = threading.Event()
         self._asyncio: asyncio.AbstractEventLoop
         self._main: asyncio.Task[None]
-        self._thread = threading.Thread(target=self._run, name="covista-cluster")
+        self._thread = threading.Thread(target=self._run, name="covista-cluster", daemon=True)
         self._thread.start()
         self._begun.wait()
 
@@ -87,7 +87,9 @@ class Cluster:
         with self._lock:
             self._closed = True
         self._asyncio.call_soon_threadsafe(self._main.cancel)
-        self._thread.join()
+        self._thread.join(_END_S)
+        if self._thread.is_alive():
+            log.warning("the connection with %s%s does not end", SCHEME, self._scheduler)
         self._threads.close()
         if self._aside is not None:
             self._aside.close()
@@ -121,11 +123,7 @@ class Cluster:
 
         for name in _LOGGERS:
             logging.getLogger(name).setLevel(logging.CRITICAL)
-        # Dask makes much ado about an address where nobody listens.
-        host, _, port = self._scheduler.rpartition(":")
-        async with asyncio.timeout(_CONNECT_S):
-            _, writer = await asyncio.open_connection(host.strip("[]"), int(port))
-        writer.close()
+        await self._probe()
         client: Client = Client(
             f"tcp://{self._scheduler}", asynchronous=True, set_as_default=False, timeout=_CONNECT_S, name="covista"
         )
@@ -138,6 +136,16 @@ class Cluster:
             await _close(client)
             raise
         return client
+
+    async def _probe(self) -> None:
+        """Is anybody there who speaks first, as a scheduler does? Dask makes much ado about an address without."""
+        host, _, port = self._scheduler.rpartition(":")
+        async with asyncio.timeout(_CONNECT_S):
+            reader, writer = await asyncio.open_connection(host.strip("[]"), int(port))
+            try:
+                await reader.readexactly(1)
+            finally:
+                writer.close()
 
     async def _use(self, client: Client) -> None:
         """Send jobs to a cluster until it is away."""

@@ -172,7 +172,10 @@ class Connection:
             there.release()
 
     async def _answer(self, there: Future[bytes], post: Post, deadline_s: float) -> bytes:
-        answer, gone = asyncio.ensure_future(cast(Awaitable[bytes], there.result())), asyncio.ensure_future(post.gone.wait())
+        answer, gone = (
+            asyncio.ensure_future(cast(Awaitable[bytes], there.result())),
+            asyncio.ensure_future(post.gone.wait()),
+        )
         try:
             await asyncio.wait({answer, gone}, timeout=deadline_s, return_when=asyncio.FIRST_COMPLETED)
             if answer.done() and not answer.cancelled():
