@@ -115,12 +115,6 @@ class Station:
         self._groups.set_options(options)
         self._snapshot = None
 
-    def resize(self, capacity: int) -> None:
-        """Have so many surveys, and so many extractions, under way at once from now on."""
-        self.options = replace(self.options, capacity=capacity)
-        self._surveys.resize(capacity)
-        self._extractions.resize(capacity)
-
     def snapshot(self, now_ns: int) -> Snapshot:
         """All that is known, for ages as of `now_ns`; cheap while nothing changes."""
         if self._snapshot is None:

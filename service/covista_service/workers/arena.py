@@ -22,13 +22,13 @@ ARENA_BYTES = 1 << 30
 
 @dataclass(frozen=True, slots=True)
 class Slip:
-    """Where features lie: `size` bytes from `start`, n keypoints and then n descriptors of `width` bytes."""
+    """Where features lie: `size` bytes from `start`, keypoints (`points`, 2) and then descriptors of this shape."""
 
     kind: str
     start: int
     size: int
-    n: int
-    width: int
+    points: int
+    names: tuple[int, ...]
 
 
 class Arena:
@@ -56,7 +56,7 @@ class Arena:
             return None
         self._memory[start : start + points.nbytes] = points.tobytes()
         self._memory[start + points.nbytes : start + size] = names.tobytes()
-        return Slip(features.kind, start, size, len(points), names.shape[1])
+        return Slip(features.kind, start, size, len(points), names.shape)
 
     def free(self, slip: Slip) -> None:
         """Give back the room, and the memory behind it."""
@@ -91,9 +91,9 @@ class Lent:
 
     def features(self, slip: Slip) -> Features:
         """A copy of what was laid down."""
-        edge = slip.start + 8 * slip.n
+        edge = slip.start + 8 * slip.points
         points = self._array(slip.start, edge).view(np.float32).reshape(-1, 2)
-        return Features(slip.kind, points, self._array(edge, slip.start + slip.size).reshape(slip.n, slip.width))
+        return Features(slip.kind, points, self._array(edge, slip.start + slip.size).reshape(slip.names))
 
     def close(self) -> None:
         """Let go of it."""

@@ -102,7 +102,9 @@ class Processes:
         try:
             if not child.alive:
                 child = self._after(child)
-            features = [self._shared(one) if child.shares() else self._by_value(one) for one in job.features]
+            # Loading compiled code is not the job's time.
+            place = self._shared if child.shares() else self._by_value
+            features = [place(one) for one in job.features]
             return child.ask(packed, features, self._deadline_s)
         except TimeoutError:
             self._tally.note("overdue")
@@ -144,7 +146,7 @@ class Processes:
                 self._tally.note("shipped_bytes", slip.size)
         return slip or self._by_value(features)
 
-    def _by_value(self, features: Features) -> Features:
+    def _by_value(self, features: Features) -> Slip | Features:
         self._tally.note("shipped_bytes", features.keypoints_px.nbytes + features.descriptors.nbytes)
         return features
 

@@ -1,70 +1,53 @@
-import os
-import signal
-import subprocess
-import sys
 import threading
 from collections.abc import Iterator
-from concurrent.futures import CancelledError, wait
+from concurrent.futures import CancelledError
+from contextlib import ExitStack
+from dataclasses import replace
 
 import numpy as np
-import psutil
 import pytest
 from covista_schemas import features
 from covista_schemas.codec import BAD_IMAGE
-from covista_schemas.errors import DecodeError
-from covista_service.link.mailbox import Letter, Mailboxes
-from covista_service.link.translate import events_of
-from covista_service.perception.camera import View
-from covista_service.perception.comparison import Outcome
-from covista_service.perception.scene import Evidence, Sight
-from covista_service.perception.warming import warm_up
-from covista_service.station.events import BuildSurfaces, Keyframe, KeyframeArrived, KeyframeId, SurveyPair
+from covista_schemas.errors import DecodeError, MissingExtraError
+from covista_service.perception.comparison import Outcome, compare
+from covista_service.perception.scene import Evidence, SceneOptions, Sight
+from covista_service.station.events import BuildSurfaces, Keyframe, KeyframeId
 from covista_service.station.outlook import Outlook, masks
-from covista_service.workers import Workers, WorkersOptions, extract
+from covista_service.workers import Workers, WorkersOptions, extract, load, scheduler
 
 from tests.service.deadline import wait_until
 from tests.service.wall import keyframe_bytes, overlap, picture, picture_bytes
+from tests.service.workers.dask_cluster import dask_cluster
+from tests.service.workers.pairs import arrived, pair
 
 # The first one may have to wait for the compiler.
 pytestmark = pytest.mark.timeout(300)
-
-
-def arrived(data: bytes, robot: str) -> Keyframe:
-    boxes = Mailboxes()
-    boxes.put(Letter(robot, "keyframe", "b0", 0, data, 0))
-    (mail,), _ = boxes.drain(1, 0)
-    event = list(events_of(mail))[-1]
-    assert isinstance(event, KeyframeArrived)
-    return event.keyframe
 
 
 def keyframe(name: KeyframeId) -> Keyframe:
     return arrived(keyframe_bytes(name.robot), name.robot)
 
 
-def pair(distance_m: float = 1.0) -> SurveyPair:
-    first, second = arrived(keyframe_bytes("r1"), "r1"), arrived(keyframe_bytes("r2", distance_m), "r2")
-    assert first.features is not None
-    assert second.features is not None
-    return SurveyPair(
-        first.id,
-        second.id,
-        View(first.camera, first.pose, first.features),
-        View(second.camera, second.pose, second.features),
-    )
-
-
 @pytest.fixture(scope="module", autouse=True)
 def compiled() -> None:
     """What a fresh machine has to compile first, so that no worker below is waited for while it does."""
-    warm_up()
+    load()
 
 
-@pytest.fixture(scope="module", params=["threads", "processes"])
+@pytest.fixture(scope="module", params=["threads", "processes", "dask"])
 def workers(request: pytest.FixtureRequest) -> Iterator[Workers]:
-    workers = Workers(WorkersOptions(request.param, count=1))
-    yield workers
-    workers.close()
+    """Every kind, with room for one job."""
+    with ExitStack() as stack:
+        kind = request.param
+        if kind == "dask":
+            cluster = stack.enter_context(dask_cluster())
+            cluster.scheduler()
+            cluster.worker()
+            kind = cluster.url
+        workers = Workers(WorkersOptions(kind, count=1))
+        stack.callback(workers.close)
+        wait_until(lambda: workers.warm and workers.status().fallback is None, "workers are ready", 60)
+        yield workers
 
 
 def test_pictures_become_features(workers: Workers) -> None:
@@ -122,29 +105,52 @@ def test_a_keyframe_without_a_picture_is_a_mistake_of_ours(workers: Workers) -> 
         workers.extract(arrived(keyframe_bytes("r1"), "r1"))
 
 
-def test_workers_are_warm_before_their_first_job(workers: Workers) -> None:
-    # Said in words, for neither this test nor what a cache says of itself can be sent to a process.
-    asked = f"__import__({warm_up.__module__!r}, fromlist='*').warm_up.cache_info().currsize"
-    assert workers._submit(eval, asked).result(30) == 1
+def test_a_job_s_own_error_comes_back(workers: Workers) -> None:
+    """It is not the workers' fault, and nothing is tried again for it."""
+    before = workers.status()
+    views = pair()
+    odd = replace(views.second_view.features, keypoints_px=np.zeros((1, 2), np.float32))
+    job = workers.survey(replace(views, second_view=replace(views.second_view, features=odd)))
+    with pytest.raises(IndexError):
+        job.result(30)
+    after = workers.status()
+    assert (after.retried, after.lost, after.given_up) == (before.retried, before.lost, before.given_up) == (0, 0, 0)
 
 
-def test_a_pool_whose_process_died_is_replaced() -> None:
-    before = set(psutil.Process().children())
-    workers = Workers(WorkersOptions("processes", count=1))
-    assert workers.survey(pair()).result(30).outcome is Outcome.MEASURED
-    (child,) = [
-        each for each in psutil.Process().children() if each not in before and "spawn_main" in " ".join(each.cmdline())
-    ]
-    child.kill()
-    wait_until(lambda: not psutil.pid_exists(child.pid) or child.status() == psutil.STATUS_ZOMBIE)
+def test_all_kinds_find_the_same(workers: Workers) -> None:
+    job = pair()
+    here = compare(job.first_view, job.second_view, SceneOptions().comparison)
+    there = workers.survey(job).result(30)
+    assert np.array_equal(here.matches, there.matches)
+    assert np.array_equal(here.pose.rotation, there.pose.rotation)
 
-    def works_again() -> bool:
-        done = workers.survey(pair())
-        wait([done], 30)
-        return done.exception() is None
 
-    wait_until(works_again, "a survey after a worker died", 30)
-    workers.close()
+def test_capacity_is_what_was_asked_for(workers: Workers) -> None:
+    assert workers.capacity == workers.status().capacity == 1
+
+
+def test_features_travel_once(workers: Workers) -> None:
+    """However many jobs they take part in; to threads they do not travel at all."""
+    job = pair()
+    size = sum(
+        one.features.keypoints_px.nbytes + one.features.descriptors.nbytes for one in (job.first_view, job.second_view)
+    )
+    before = workers.status().shipped_bytes
+    for _ in range(5):
+        workers.survey(job).result(30)
+    shipped = workers.status().shipped_bytes - before
+    assert shipped == 0 if workers.status().kind == "threads" else size <= shipped < 1.1 * size
+
+
+def test_unknown_kinds_are_refused() -> None:
+    with pytest.raises(ValueError, match="no such workers: goblins"):
+        Workers(WorkersOptions("goblins"))
+
+
+def test_an_absent_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(scheduler, "find_spec", lambda name: None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'covista\[scale\]'"):
+        Workers(WorkersOptions("dask://127.0.0.1:8786"))
 
 
 def test_closing_drops_what_waits_and_leaves_nothing() -> None:
@@ -157,28 +163,3 @@ def test_closing_drops_what_waits_and_leaves_nothing() -> None:
     assert threading.active_count() == before
     with pytest.raises(CancelledError):
         workers.survey(pair()).result(1)
-
-
-_STATION = """
-import sys
-from covista_service.workers import Workers, WorkersOptions
-if __name__ == "__main__":
-    workers = Workers(WorkersOptions("processes", count=1))
-    workers._submit(int).result()
-    print("ready", flush=True)
-    sys.stdin.read()
-"""
-
-
-def test_worker_processes_end_with_a_station_that_is_killed() -> None:
-    station = subprocess.Popen([sys.executable, "-c", _STATION], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-    assert station.stdin is not None
-    assert station.stdout is not None
-    with station.stdin, station.stdout:
-        assert station.stdout.readline() == b"ready\n"
-        family = psutil.Process(station.pid).children(recursive=True)
-        assert family
-        os.kill(station.pid, signal.SIGKILL)
-        station.wait()
-    gone, alive = psutil.wait_procs(family, timeout=10)
-    assert not alive, gone
