@@ -52,7 +52,14 @@ def test_the_environment_says_lists_and_choices_as_text(monkeypatch: pytest.Monk
         ("criterion", "best", "'adaptive', 'silhouette'"),
         ("grouping", "best", "'spectral', 'components' or 'distance'"),
         ("min_group_size", 0, "greater than or equal to 1"),
-        ("workers", "dask", "'threads' or 'processes'"),
+        ("workers", "dask", "'dask' is not threads, processes or dask://HOST:PORT"),
+        ("workers", "dask://scheduler", "not threads, processes or dask://HOST:PORT"),
+        ("workers", "dask://scheduler:0", "not threads, processes or dask://HOST:PORT"),
+        ("workers", "dask://scheduler:65536", "port from 0 to 65535"),
+        ("workers", "dask://:8786", "not threads, processes or dask://HOST:PORT"),
+        ("workers", "dask://a b:8786", "not threads, processes or dask://HOST:PORT"),
+        ("workers", "dask://scheduler:8786/path", "not threads, processes or dask://HOST:PORT"),
+        ("workers", "tcp://scheduler:8786", "not threads, processes or dask://HOST:PORT"),
         ("workers_count", 0, "greater than or equal to 1"),
         ("api", "8000", "not HOST:PORT"),
         ("api", "127.0.0.1:70000", "port from 0 to 65535"),
@@ -113,6 +120,11 @@ def test_an_absent_file_is_named(tmp_path: Path) -> None:
 def test_settings_travel_between_processes() -> None:
     settings = load({"groups": {"min": 1, "max": 2}})
     assert pickle.loads(pickle.dumps(settings)) == settings
+
+
+@pytest.mark.parametrize("workers", ["threads", "processes", "dask://scheduler:8786", "dask://[::1]:8786"])
+def test_workers_of_all_kinds(workers: str) -> None:
+    assert load({"workers": workers}).workers == workers
 
 
 def test_addresses_of_both_families() -> None:

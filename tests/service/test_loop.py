@@ -150,6 +150,33 @@ def test_a_crew_that_cannot_take_a_job_gives_it_back(monkeypatch: pytest.MonkeyP
     assert desk.loop.snapshot().pair("r1", "r2").found_by is FoundBy.IMAGE
 
 
+def test_workers_come_and_go() -> None:
+    """Never more is under way than they can take, from the next turn on; what is under way is let be."""
+    desk = Desk()
+    held: list[Future] = []
+
+    def take(job: SurveyPair) -> Future:
+        held.append(Future())
+        return held[-1]
+
+    desk.hands.survey = take  # type: ignore[method-assign]
+    for number in range(8):
+        desk.put(keyframe_bytes(f"r{number}", 0.1 * number), f"r{number}")
+    desk.settle()
+    assert len(held) == desk.station.options.capacity == 2
+    desk.hands.capacity = 5
+    desk.settle()
+    assert len(held) == 5
+    desk.hands.capacity = 1
+    for done in held[:4]:
+        done.set_exception(ValueError("singular"))
+        desk.settle()
+    assert len(held) == 5
+    held[4].set_exception(ValueError("singular"))
+    desk.settle()
+    assert len(held) == 6
+
+
 def test_a_failed_survey_is_counted_and_survived(caplog: pytest.LogCaptureFixture) -> None:
     desk = Desk()
     desk.hands.failure = ValueError("singular")
