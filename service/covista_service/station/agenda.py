@@ -79,10 +79,6 @@ class Agenda:
         """Robots whose views may meet this one's."""
         return self._partners.get(robot, _NOBODY).keys()
 
-    def resize(self, capacity: int) -> None:
-        """Have so many surveys under way from now on."""
-        self._capacity = capacity
-
     @property
     def under_way_count(self) -> int:
         """How many surveys are under way."""

@@ -17,10 +17,6 @@ class Extractions:
         self._waiting: dict[str, Keyframe] = {}
         self._under_way: dict[str, Keyframe] = {}
 
-    def resize(self, capacity: int) -> None:
-        """Have so many under way from now on."""
-        self._capacity = capacity
-
     def wait(self, keyframe: Keyframe) -> Keyframe | None:
         """Let a keyframe wait in its robot's place; the older one whose place it takes."""
         older = self._waiting.get(keyframe.id.robot)

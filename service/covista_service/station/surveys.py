@@ -80,11 +80,6 @@ class Surveys:
             started.append(self._survey(*keyframes))
         return started
 
-    def resize(self, capacity: int) -> None:
-        """Have so many jobs under way from now on."""
-        self._capacity = capacity
-        self._agenda.resize(capacity)
-
     def take(self, event: SurveyDone | SurfacesBuilt, now_ns: int) -> list[Happened]:
         """Take in what a worker has found."""
         return self._surveyed(event, now_ns) if isinstance(event, SurveyDone) else self._built(event, now_ns)
