@@ -67,11 +67,11 @@ class Child:
 
     def _hear(self, deadline_s: float) -> bytes:
         try:
-            if not self._line.poll(deadline_s):
-                raise TimeoutError
-            return self._line.recv_bytes()
-        except (ConnectionError, BrokenPipeError) as error:
+            if self._line.poll(deadline_s):
+                return self._line.recv_bytes()
+        except OSError as error:
             raise EOFError from error
+        raise TimeoutError
 
 
 def _work(line: Connection, arena: str | None) -> None:

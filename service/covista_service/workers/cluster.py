@@ -215,4 +215,5 @@ def _why(error: Exception) -> str:
 
 async def _close(client: Client) -> None:
     with suppress(Exception):
-        await asyncio.wait_for(client.close(), _CLOSE_S)
+        async with asyncio.timeout(_CLOSE_S):
+            await client.close()

@@ -92,13 +92,15 @@ class Connection:
         self._client.subscribe_topic("all", lambda _: self._stir.set())
         while not self._cut_off():
             try:
-                threads = await asyncio.wait_for(self._client.nthreads(), _ANSWER_S)
+                async with asyncio.timeout(_ANSWER_S):
+                    threads = await self._client.nthreads()
             except Exception as error:  # noqa: BLE001 - no answer is an answer
                 log.debug("the scheduler does not say who is there: %r", error)
                 break
             self._meet(threads)
             with suppress(TimeoutError):
-                await asyncio.wait_for(self._stir.wait(), _LOOK_S)
+                async with asyncio.timeout(_LOOK_S):
+                    await self._stir.wait()
             self._stir.clear()
         self.leave()
 
