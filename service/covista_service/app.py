@@ -123,7 +123,7 @@ async def _end(task: asyncio.Task[None]) -> None:
 
 def _crew_health(workers: Workers, kind: str) -> PartHealth:
     crew = workers.status()
-    detail = f"{crew.capacity} at {kind}" if crew.kind == "dask" else f"{crew.capacity} {kind}"
+    detail = f"{crew.capacity} jobs at {kind}" if crew.kind == "dask" else f"{crew.capacity} {kind}"
     if not workers.warm:
         return PartHealth(status="starting", detail=f"{detail}, loading compiled code")
     if crew.fallback is not None:

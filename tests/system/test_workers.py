@@ -82,7 +82,7 @@ def test_a_worker_is_killed_and_every_pair_is_surveyed(cluster: DaskCluster, tmp
     cluster.scheduler()
     workers = [cluster.worker() for _ in range(2)]
     with swarm_at(cluster, tmp_path) as swarm:
-        both = PartHealth(status="ready", detail=f"2 at {cluster.url}")
+        both = PartHealth(status="ready", detail=f"4 jobs at {cluster.url}")
         wait_until(lambda: swarm.workers() == both, "both workers are ready", 60)
         swarm.send()
         wait_until(swarm.measured, "some pairs are measured")
@@ -90,7 +90,7 @@ def test_a_worker_is_killed_and_every_pair_is_surveyed(cluster: DaskCluster, tmp
         cluster.kill(workers[0])
         swarm.send()
         wait_until(swarm.all_measured, "every pair is measured", 30)
-        one = PartHealth(status="ready", detail=f"1 at {cluster.url}")
+        one = PartHealth(status="ready", detail=f"2 jobs at {cluster.url}")
         wait_until(lambda: swarm.workers() == one, "one worker is left")
         assert swarm.control.ready().status == "ready"
         assert [each.last_problem for each in swarm.control.robots().robots] == [None] * len(ROBOTS)
@@ -108,7 +108,7 @@ def test_a_station_goes_on_without_a_scheduler_and_goes_back_to_it(cluster: Dask
             swarm.send()
             wait_until(swarm.all_measured, "every pair is measured here", 30)
             scheduler, _ = cluster.scheduler(), cluster.worker()
-            wait_until(lambda: swarm.workers().detail == f"1 at {cluster.url}", "it is there again", 60)
+            wait_until(lambda: swarm.workers().detail == f"2 jobs at {cluster.url}", "it is there again", 60)
             swarm.send()
             wait_until(swarm.measured, "some pairs are measured there", 30)
             cluster.kill(scheduler)

@@ -6,6 +6,7 @@ import asyncio
 import logging
 import os
 import threading
+import time
 from concurrent.futures import Future
 from contextlib import suppress
 from importlib.metadata import version
@@ -86,8 +87,12 @@ class Cluster:
         """Drop jobs at the cluster, let those here end, and let go of the cluster."""
         with self._lock:
             self._closed = True
-        self._asyncio.call_soon_threadsafe(self._main.cancel)
-        self._thread.join(_END_S)
+        ends_s = time.monotonic() + _END_S
+        while self._thread.is_alive() and time.monotonic() < ends_s:
+            # More than once, for what waits in libraries may take it for something else.
+            with suppress(RuntimeError):
+                self._asyncio.call_soon_threadsafe(self._main.cancel)
+            self._thread.join(1.0)
         if self._thread.is_alive():
             log.warning("the connection with %s%s does not end", SCHEME, self._scheduler)
         self._threads.close()
@@ -107,7 +112,7 @@ class Cluster:
     async def _keep(self) -> None:
         """Be connected, again and again."""
         pause_s = _PAUSE_S
-        while True:
+        while not self._closed:
             try:
                 client = await self._connect()
             except Exception as error:  # noqa: BLE001 - whatever it is, it is told, and tried again
@@ -155,8 +160,8 @@ class Cluster:
             if why is None:
                 self._connection = connection
                 log.info("connected with %s%s", SCHEME, self._scheduler)
-                await connection.watch()
-            self._note_away(why or "connection lost")
+                why = await connection.watch()
+            self._note_away(why)
         finally:
             self._connection = None
             connection.leave()
@@ -170,7 +175,7 @@ class Cluster:
             return unlike(error)
 
     def _note_away(self, why: str) -> None:
-        if why != self._why_away:
+        if why != self._why_away and not self._closed:
             log.warning("%s%s is away (%s); %d threads here", SCHEME, self._scheduler, why, self._count)
         self._why_away = why
 

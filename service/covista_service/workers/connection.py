@@ -24,6 +24,8 @@ from covista_service.workers.shipped import Shipped
 if TYPE_CHECKING:
     from distributed import Client, Future
 
+# To and from a worker a job takes some 20 ms, longer than most are worked at: as many are on their way as are done.
+_ON_THE_WAY = 2
 # Dask tells who comes and goes; who is there is asked besides, every so often, and the answer comes within so long.
 _LOOK_S, _ANSWER_S = 1.0, 5.0
 _DISTRIBUTION = "covista"
@@ -69,8 +71,8 @@ class Connection:
 
     @property
     def capacity(self) -> int:
-        """How many jobs the cluster does at a time."""
-        return sum(post.slots for post in self.posts)
+        """How many jobs keep the cluster busy: those that it does, and as many on their way."""
+        return _ON_THE_WAY * sum(post.slots for post in self.posts)
 
     @property
     def greeting(self) -> bool:
@@ -87,15 +89,16 @@ class Connection:
         result: _T = unpacked(await self._perform(job, post, self._deadline_s))
         return result
 
-    async def watch(self) -> None:
-        """Keep to who is there, until the scheduler is not."""
+    async def watch(self) -> str:
+        """Keep to who is there, until the scheduler is not; why it is not."""
+        why = "connection lost"
         self._client.subscribe_topic("all", lambda _: self._stir.set())
         while not self._cut_off():
             try:
                 async with asyncio.timeout(_ANSWER_S):
                     threads = await self._client.nthreads()
             except Exception as error:  # noqa: BLE001 - no answer is an answer
-                log.debug("the scheduler does not say who is there: %r", error)
+                why = f"does not say who is there: {error or type(error).__name__}"
                 break
             self._meet(threads)
             with suppress(TimeoutError):
@@ -103,6 +106,7 @@ class Connection:
                     await self._stir.wait()
             self._stir.clear()
         self.leave()
+        return why
 
     def leave(self) -> None:
         """Expect nothing any more; jobs under way hear of it."""
@@ -143,7 +147,7 @@ class Connection:
             if why is None:
                 unpacked(await self._perform(loading(), post, LOADING_S))
                 self.posts = (*self.posts, post)
-                log.info("worker %s is ready; %d jobs at a time", post.address, self.capacity)
+                log.info("worker %s is ready, one of %d", post.address, len(self.posts))
         except Exception as error:  # noqa: BLE001 - told to whoever asks for the health
             why = f"cannot be used: {error or type(error).__name__}"
         if why is not None and not self.away:

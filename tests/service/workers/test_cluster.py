@@ -39,11 +39,11 @@ def jobs_here(dask: DaskCluster) -> Iterator[Cluster]:
 
 @pytest.fixture
 def cluster(dask: DaskCluster, jobs_here: Cluster) -> Cluster:
-    """With two workers at least, whatever the test before has done to them."""
+    """With two workers at least, whatever the test before has done to them; each can take two jobs."""
     ready = jobs_here.status()
-    for _ in range(2 - (0 if ready.fallback else ready.capacity)):
+    for _ in range(2 - (0 if ready.fallback else ready.capacity // 2)):
         dask.worker()
-    wait_until(lambda: jobs_here.status().fallback is None and jobs_here.status().capacity >= 2, "two workers", 60)
+    wait_until(lambda: (now := jobs_here.status()).fallback is None and now.capacity >= 4, "two workers", 60)
     return jobs_here
 
 

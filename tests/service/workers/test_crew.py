@@ -126,7 +126,8 @@ def test_all_kinds_find_the_same(workers: Workers) -> None:
 
 
 def test_capacity_is_what_was_asked_for(workers: Workers) -> None:
-    assert workers.capacity == workers.status().capacity == 1
+    """To and from a cluster jobs take time: one may be on its way while another is done."""
+    assert workers.capacity == workers.status().capacity == (2 if workers.status().kind == "dask" else 1)
 
 
 def test_features_travel_once(workers: Workers) -> None:
