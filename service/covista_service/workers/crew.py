@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 from covista_service.loop import Built, CrewStatus, Extraction
@@ -55,7 +55,7 @@ class Workers:
     @property
     def warm(self) -> bool:
         """Is compiled code loaded, so that no keyframe has to wait for it?"""
-        return self._loaded.done() and self._pool.status().warm
+        return self.status().warm
 
     @property
     def capacity(self) -> int:
@@ -63,8 +63,9 @@ class Workers:
         return self._pool.status().capacity
 
     def status(self) -> CrewStatus:
-        """How the workers are; cheap, and for any thread."""
-        return self._pool.status()
+        """How the workers are; cheap, and for any thread. `warm` speaks for this process too."""
+        status = self._pool.status()
+        return replace(status, warm=status.warm and self._loaded.done())
 
     def extract(self, keyframe: Keyframe) -> Future[Extraction]:
         """Decode the keyframe's image and extract its features and a thumbnail.

@@ -36,7 +36,9 @@ class Desk:
     vitals: Vitals = field(
         default_factory=lambda: Vitals(
             mail=Depths(robots=3, messages=4, payload_bytes=5),
-            crew=CrewStatus("threads", 2, fallback="no scheduler", lost=1, retried=6),
+            crew=CrewStatus(
+                "threads", 2, fallback="no scheduler", lost=1, retried=6, overdue=2, given_up=3, shipped_bytes=4
+            ),
             sinks={"zenoh": SinkStatus(7, 8, 9), "history": SinkStatus(10, 11, 12)},
             turned_away={"wrong_key": 2},
             sessions=13,
