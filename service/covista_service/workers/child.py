@@ -16,9 +16,8 @@ from covista_service.workers.arena import Lent, Slip
 from covista_service.workers.jobs import load, perform, use_one_core
 from covista_service.workers.pool import LOADING_S
 
-# A process that is told to end does so at once, unless it is in the middle of a job.
 _END_S = 5.0
-_SHARES, _ALONE, _END = b"shares", b"alone", b""
+_SHARES, _ALONE = b"shares", b"alone"
 
 
 class Child:
@@ -38,6 +37,11 @@ class Child:
         """Has it not died?"""
         return self._process.is_alive()
 
+    @property
+    def loading(self) -> bool:
+        """Is it not known to be ready for a job?"""
+        return self._shares is None
+
     def shares(self) -> bool:
         """Does it see the shared features? Waits until it is ready. Raises EOFError if it died, or TimeoutError."""
         if self._shares is None:
@@ -52,11 +56,8 @@ class Child:
             raise EOFError from error
         return self._hear(deadline_s)
 
-    def end(self, patience_s: float = 0.0) -> None:
-        """Let it end by itself, but for no longer than this."""
-        with suppress(OSError):
-            self._line.send_bytes(_END)
-        self._process.join(patience_s)
+    def end(self) -> None:
+        """End it, whatever it does: it holds nothing that would be left."""
         self._process.kill()
         self._process.join(_END_S)
         self._line.close()
@@ -86,8 +87,8 @@ def _work(line: Connection, arena: str | None) -> None:
     load()
     with suppress(EOFError, OSError):
         line.send_bytes(_ALONE if lent is None else _SHARES)
-        while message := line.recv_bytes():
-            line.send_bytes(_perform(message, lent))
+        while True:
+            line.send_bytes(_perform(line.recv_bytes(), lent))
 
 
 def _perform(message: bytes, lent: Lent | None) -> bytes:

@@ -18,7 +18,7 @@ from covista_service.workers.pool import DEADLINE_S, TRIES, JobLostError, Tally
 from covista_service.workers.shipped import Shipped
 
 # When the pool closes, jobs under way get so long to end.
-_GRACE_S = 5.0
+_GRACE_S = 2.0
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
 
@@ -59,12 +59,15 @@ class Processes:
         """Let jobs under way end, within reason, and drop those that wait."""
         self._closing = True
         self._threads.shutdown(wait=False, cancel_futures=True)
+        for child in self._family():
+            if child.loading:
+                child.kill()
         if wait(list(self._under_way), _GRACE_S).not_done:
             for child in self._family():
                 child.kill()
         self._threads.shutdown(wait=True)
         for child in self._idle:
-            child.end(_GRACE_S)
+            child.end()
         if self._arena is not None:
             self._arena.close()
 
@@ -80,7 +83,8 @@ class Processes:
         try:
             child.shares()
         except (EOFError, TimeoutError):
-            log.warning("a worker could not load compiled code; it is replaced when a job comes")
+            if not self._closing:
+                log.warning("a worker could not load compiled code; it is replaced when a job comes")
         finally:
             self._idle.append(child)
 
