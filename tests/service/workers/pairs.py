@@ -12,7 +12,7 @@ def arrived(data: bytes, robot: str) -> Keyframe:
     """A keyframe on the wire, as the station takes it in."""
     boxes = Mailboxes()
     boxes.put(Letter(robot, "keyframe", "b0", 0, data, 0))
-    (mail,), _ = boxes.drain(1)
+    (mail,), _ = boxes.drain(1, 0)
     event = list(events_of(mail))[-1]
     assert isinstance(event, KeyframeArrived)
     return event.keyframe
