@@ -21,7 +21,7 @@ from covista_service.station.forecasts import Forecasts
 from covista_service.station.groups import Groups
 from covista_service.station.options import NS_PER_S, StationOptions
 from covista_service.station.outlooks import Outlooks
-from covista_service.station.pairs import Pairs
+from covista_service.station.pairs import Pairs, pair_of
 from covista_service.station.roster import Roster
 
 PEER = "visibility of the same pairs alone"
@@ -86,9 +86,12 @@ class _Swarm:
         self._roster, self._outlooks = Roster(options), Outlooks()
         pairs, groups = Pairs(round(options.unknown_after_s * NS_PER_S)), Groups(options)
         self._forecasts = Forecasts(
-            self._roster, pairs, groups, self._outlooks, self._team.__getitem__, options, prospects.read
+            self._roster, pairs, groups, self._outlooks, lambda _robot, _pose: (), options, prospects.read
         )
         self._now_ns = 0
+        for robot, others in self._team.items():
+            for other in others:
+                pairs.meet(pair_of(robot, other), None)
         for member in self._members:
             groups.place(member.name.robot, member.pose.centre_m)
             self._show(member)

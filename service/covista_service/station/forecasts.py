@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
-from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from itertools import islice
 
@@ -25,10 +25,12 @@ from covista_service.station.roster import Fix, Robot, Roster
 
 # The overlaps of pairs of prospects, as `prospects.read` tells them.
 Read = Callable[[Sequence[Prospect], NDArray[np.integer], Sequence[Ratios], Sequence[int]], list[Answer]]
-Partners = Callable[[str], AbstractSet[str]]
+# Robots whose views may meet that of one that is at another pose than that of its newest keyframe.
+Meeting = Callable[[str, Pose], Sequence[str]]
 # A robot has moved if it has turned by so much, or gone by so large a share of the median depth that it sees.
-_TURNED_DEG, _GONE_SHARE = 1.0, 0.02
-_LEAST_TRACE = 1 + 2 * float(np.cos(np.deg2rad(_TURNED_DEG)))
+_TURNED_RAD, _GONE_SHARE = math.radians(1.0), 0.02
+# So many times that far from where its keyframe was taken, a robot may meet others than from there.
+_FAR = 5.0
 # Ordered pairs in one turn: some ten milliseconds.
 _AT_ONCE = 256
 
@@ -53,16 +55,16 @@ class Forecasts:
         pairs: Pairs,
         groups: Groups,
         outlooks: Outlooks,
-        partners: Partners,
+        meeting: Meeting,
         options: StationOptions,
         read: Read,
     ) -> None:
-        """`partners` tells whose views may meet a robot's, `read` the overlaps of prospects."""
+        """`meeting` tells whose views may meet a robot's from where it is, `read` the overlaps of prospects."""
         self._roster = roster
         self._pairs = pairs
         self._groups = groups
         self._outlooks = outlooks
-        self._partners = partners
+        self._meeting = meeting
         self._overlaps_of = read
         self._allowance = Allowance(options.forecasts_per_s)
         self._allowed = options.forecasts_per_s > 0
@@ -86,7 +88,7 @@ class Forecasts:
         """Surfaces of these robots are new: all overlaps that they have part in are read at once."""
         for robot in robots:
             self._waiting.pop(robot, None)
-        self._read({robot: sorted(self._partners(robot)) for robot in robots}, robots, now_ns)
+        self._read({robot: self._beside(robot) for robot in robots}, robots, now_ns)
 
     def look(self, now_ns: int) -> bool:
         """Read the overlaps of robots that have moved, as many as are allowed by now; False if there were none."""
@@ -120,8 +122,7 @@ class Forecasts:
             if room <= 0:
                 break
             turn = self._waiting[robot]
-            partners = self._partners(robot)
-            rest = sorted(partners) if turn.rest is None else [other for other in turn.rest if other in partners]
+            rest = self._beside(robot) if turn.rest is None else turn.rest
             count = max(room // 2, 1)
             wanted[robot] = rest[:count]
             room -= 2 * len(wanted[robot])
@@ -134,6 +135,16 @@ class Forecasts:
             if turn.again:
                 self._waiting[robot] = _Turn()
         return wanted, whole
+
+    def _beside(self, robot: str) -> list[str]:
+        """All that something is known with, and, where a robot is far from its keyframe, all that its view may meet."""
+        beside = dict.fromkeys(self._pairs.beside(robot))
+        source, known = self._outlooks[robot], self._roster[robot]
+        if source is not None and known.fix is not None and known.keyframe is not None:
+            pose = known.fix.pose
+            if _apart(known.keyframe.pose, pose, source, _FAR):
+                beside.update(dict.fromkeys(self._meeting(robot, pose)))
+        return sorted(beside)
 
     def _read(self, wanted: dict[str, list[str]], whole: Sequence[str], now_ns: int | None) -> int:
         """Read robots with their partners, and how many pairs that were; at `now_ns` from surfaces that are new.
@@ -163,6 +174,9 @@ class Forecasts:
         return len(pairs)
 
     def _enter(self, pair: Pair, answer: Answer) -> None:
+        if pair not in self._pairs and answer.overlaps == (0.0, 0.0):
+            # Of those who share nothing nothing is kept.
+            return
         held = self._pairs[pair].answer
         again = self._pairs.enter(pair, answer)
         moved = again and held is not None and (answer.poses is None or not held.stands_for(*answer.poses))
@@ -271,9 +285,10 @@ def _carried_along(moves: Sequence[tuple[_Seen, Pose]]) -> list[Surface]:
     )
 
 
-def _apart(one: Pose, other: Pose, outlook: Outlook) -> bool:
-    """Do two poses differ by what can be noticed in such an outlook?"""
+def _apart(one: Pose, other: Pose, outlook: Outlook, times: float = 1.0) -> bool:
+    """Do two poses differ by what can be noticed in such an outlook, or by so many times that?"""
     gone = one.centre_m - other.centre_m
     # R R' has the trace 1 + 2 cos(angle).
     trace = float(np.vdot(one.world_from_camera, other.world_from_camera))
-    return trace < _LEAST_TRACE or float(gone @ gone) > (_GONE_SHARE * outlook.depths_m[1]) ** 2
+    least_trace = 1 + 2 * math.cos(times * _TURNED_RAD)
+    return trace < least_trace or float(gone @ gone) > (times * _GONE_SHARE * outlook.depths_m[1]) ** 2

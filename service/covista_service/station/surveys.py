@@ -42,10 +42,10 @@ class Surveys:
         self._capacity = options.capacity
         self._agenda = Agenda(roster, pairs, options, groups.boundary)
         self._outlooks = Outlooks()
-        partners = self._agenda.partners
-        self.forecasts = Forecasts(roster, pairs, groups, self._outlooks, partners, options, read)
         self._corrections = Corrections()
         self.neighbourhoods = Neighbourhoods(roster, pairs, groups, self._agenda, self._corrections, options)
+        meeting = self.neighbourhoods.beside
+        self.forecasts = Forecasts(roster, pairs, groups, self._outlooks, meeting, options, read)
         # Arrivals of keyframes whose first survey no surface has been built with yet; those of them that a survey has
         # seen; and those whose first survey is in since the last evaluation.
         self._unseen: dict[str, dict[KeyframeId, int]] = {}

@@ -10,12 +10,13 @@ from covista_service.perception.camera import Pose
 from covista_service.perception.surface import flat
 from covista_service.station.events import Tick
 from covista_service.station.outlook import Outlook, stands
+from covista_service.station.pairs import Answer, Pairs
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.service.perception.scenes import turn
 from tests.service.station.scenes import BACK, NOTHING, SEEN, S, Scene, pose
-from tests.service.station.test_pairs import names, pair
+from tests.service.station.test_pairs import ASIDE, names, pair
 
 # Of a wall at four metres, each metre aside takes so much out of the image.
 PER_M = 75 / 320
@@ -167,6 +168,43 @@ def test_what_is_inherited_does_not_depend_on_how_many_keyframes_came_between() 
     np.testing.assert_array_equal(mine.surface.inverse_depth, its.surface.inverse_depth)
     np.testing.assert_array_equal(mine.surface.sigma, its.surface.sigma)
     assert pair(often).overlap_a == pair(once).overlap_a
+
+
+@given(
+    st.lists(st.tuples(st.sampled_from("abc"), st.sampled_from("xyz"), st.integers(0, 20), st.booleans()), max_size=30)
+)
+def test_answers_expire_when_they_are_old_in_whatever_order_they_come(entered) -> None:
+    scene, pairs, held = Scene(), Pairs(10 * S), {}
+    for first, second, computed_s, parts in entered:
+        keyframes = scene.keyframe(first), scene.keyframe(second)
+        if parts:
+            pairs.part((first, second))
+            held.pop((first, second), None)
+        else:
+            pairs.enter((first, second), Answer((0.5, 0.5), FoundBy.PREDICTED, computed_s * S, *keyframes))
+            held[first, second] = computed_s
+    for now_s in range(0, 40, 3):
+        old = {pair for pair, computed_s in held.items() if now_s - computed_s >= 10}
+        assert set(pairs.expire(now_s * S)) == old
+        held = {pair: computed_s for pair, computed_s in held.items() if pair not in old}
+
+
+def test_who_turns_far_meets_others_than_before_without_any_keyframe() -> None:
+    """r1 looks at one wall with r2, and turns to where r3 looks with r4."""
+    scene = robots()
+    for k, robot in ((0, "r3"), (1, "r4")):
+        scene.send(robot, pose(k, BACK))
+    scene.settle(lambda job: SEEN)
+    assert (pair(scene, "r1", "r3").overlap_a, pair(scene, "r1", "r2").overlap_a) == (0.0, ASIDE)
+    scene.send_pose("r1", away())
+    scene.tick()
+    assert pair(scene, "r1", "r2").overlap_a == 0
+    assert pair(scene, "r1", "r3").overlap_a == pytest.approx(1, abs=CELL)
+    scene.send_pose("r1", pose(0))
+    scene.tick()
+    assert pair(scene, "r1", "r2").overlap_a == ASIDE
+    assert pair(scene, "r1", "r3").overlap_a == 0
+    assert scene.snapshot.similarity.overlap[0, 2] == 0
 
 
 def test_the_common_field_is_drawn_where_the_keyframes_were_taken() -> None:
