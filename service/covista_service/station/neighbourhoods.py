@@ -229,7 +229,7 @@ class Neighbourhoods:
         self._agenda.judge(pair, plausible=False)
         answer = self._pairs.part(pair).answer
         current = tuple(self._reaches[robot].keyframe.id for robot in pair)
-        held = self._groups.see(pair, (0.0, 0.0), again=answer is not None and answer.keyframes == current)
+        held = self._groups.see(pair, (0.0, 0.0), again=answer is not None and answer.rests_on == current)
         if held is not None and held > _NEGLIGIBLE:
             for robot, other in (pair, pair[::-1]):
                 self._receding.setdefault(robot, {})[other] = None
