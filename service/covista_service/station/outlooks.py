@@ -39,6 +39,10 @@ class Outlooks:
         """Is the surface of this keyframe on its way?"""
         return self._at_work.get(name.robot) == name
 
+    def awaited(self, robot: str) -> bool:
+        """Is a robot's surface on its way, or next in turn?"""
+        return robot in self._stale or robot in self._at_work
+
     def keyframe(self, keyframe: Keyframe) -> Keyframe | None:
         """Take a robot's new keyframe; the earlier one to hold it against, if its motion tells depths."""
         robot = keyframe.id.robot

@@ -36,6 +36,7 @@ from covista_service.station.options import NS_PER_S, GroupingOptions, StationOp
 from covista_service.station.pairs import Pairs
 from covista_service.station.roster import Robot, Roster
 from covista_service.station.snapshot import RobotView, Snapshot
+from covista_service.station.successors import Successors
 from covista_service.station.surveys import Surveys
 from covista_service.station.workload import Workload
 
@@ -61,6 +62,7 @@ class Station:
         self._groups = Groups(self.options)
         self._surveys = Surveys(self._roster, self._pairs, self._groups, self.options, read)
         self._extractions = Extractions(self.options.capacity)
+        self._successors = Successors()
         self._views: dict[str, RobotView] = {}
         # Robots by id, and those that stand in no group, until somebody comes or goes.
         self._sorted: list[str] | None = None
@@ -188,7 +190,7 @@ class Station:
             self._replace(self._extractions.wait(keyframe))
         else:
             self._replace(self._extractions.withdraw(robot.id))
-            self._use(robot, keyframe)
+            self._succeed(robot, keyframe)
         return self._extract()
 
     def _features_extracted(self, event: FeaturesExtracted) -> list[Effect]:
@@ -199,10 +201,10 @@ class Station:
                 message = (keyframe.id.boot, keyframe.id.sequence)
                 robot.ledgers["keyframe"].reject(message, event.code)
                 robot.last_problem = event.problem
-            elif keyframe.id.boot != robot.boot or _older(keyframe, robot.keyframe):
+            elif keyframe.id.boot != robot.boot or _older(keyframe, self._successors[robot.id] or robot.keyframe):
                 self._replace(keyframe)
             else:
-                self._use(robot, replace(keyframe, features=event.features, thumbnail=event.thumbnail))
+                self._succeed(robot, replace(keyframe, features=event.features, thumbnail=event.thumbnail))
         return self._extract()
 
     def _pose_arrived(self, event: PoseArrived) -> None:
@@ -222,6 +224,14 @@ class Station:
             for name in event.job.keyframes:
                 self._views.pop(name.robot, None)
         return [*self._surveys.take(event, now_ns)]
+
+    def _succeed(self, robot: Robot, keyframe: Keyframe) -> None:
+        """Use a robot's new keyframe, once the one before has come to something."""
+        if self._surveys.busy(robot.id):
+            self._replace(self._successors.wait(keyframe))
+        else:
+            self._replace(self._successors.withdraw(robot.id))
+            self._use(robot, keyframe)
 
     def _use(self, robot: Robot, keyframe: Keyframe) -> None:
         robot.ledgers["keyframe"].settle((keyframe.id.boot, keyframe.id.sequence), "used")
@@ -259,6 +269,8 @@ class Station:
         for pair in expired:
             self._groups.see(pair, None)
         lapsed = self._surveys.neighbourhoods.expire(now_ns)
+        for keyframe in self._successors.due(self._surveys.busy, now_ns):
+            self._use(self._touch(keyframe.id.robot), keyframe)
         judged = self._surveys.judge(now_ns)
         for robot in judged:
             self._views.pop(robot, None)
@@ -334,6 +346,7 @@ class Station:
         self._groups.withdraw(robot)
         self._surveys.forget(robot)
         self._extractions.forget(robot)
+        self._successors.withdraw(robot)
         self._roster.forget(robot)
         self._views.pop(robot, None)
         self._snapshot = self._sorted = self._outside = None

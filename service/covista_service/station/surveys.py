@@ -65,6 +65,13 @@ class Surveys:
         self._agenda.fresh(robot.id)
         self._agenda.moved(robot.id, earlier)
 
+    def busy(self, robot: str) -> bool:
+        """Is a robot's keyframe, of which no surface is known, being surveyed? What comes of it will tell of one."""
+        keyframe, outlook = self._roster[robot].keyframe, self._outlooks[robot]
+        if keyframe is None or (outlook is not None and outlook.keyframe is keyframe):
+            return False
+        return self._agenda.under_way(keyframe.id) or self._outlooks.awaited(robot)
+
     def judge(self, now_ns: int) -> list[str]:
         """Judge the pairs of all robots with a new keyframe or depth, as to whether they may meet; who they are."""
         return self.neighbourhoods.judge(now_ns)
