@@ -32,6 +32,7 @@ _OFFERED = 1.1
 _SECONDS, _LONG_SECONDS = 10.0, 30.0
 _RAW_SECONDS = 3.0
 _LOOK_S = 1.0
+_DRAIN_S, _POLL_S = 10.0, 0.1
 
 _row = partial(Row, bench="ingest")
 
@@ -139,7 +140,7 @@ def under_flood(seconds: float, kind: flood.Kind | None = None, rate: float = 0.
         p50_ms = stand.summary().latency_p50_ms
         if p50_ms is None:
             raise LoadError("no keyframe came as far as the groups")
-        accounted = _accounted(stand, keyframes, flooded.sent if kind == "poses" else 0)
+        accounted = _drained(stand, keyframes, flooded.sent if kind == "poses" else 0)
         return Run(p50_ms, tuple(rates), flooded.sent, spent_s, accounted)
 
 
@@ -159,6 +160,14 @@ def _rates(stand: Stand, seconds: float) -> list[float]:
         looks.append((time.monotonic(), stand.summary().poses_received))
     pairs = pairwise(looks[:-1])
     return [(count - before) / (at_s - before_s) for (before_s, before), (at_s, count) in pairs]
+
+
+def _drained(stand: Stand, keyframes: int, poses: int) -> bool:
+    """Wait until what is still on its way is accounted for, for some seconds at most, and say whether it is."""
+    deadline_s = time.monotonic() + _DRAIN_S
+    while not (accounted := _accounted(stand, keyframes, poses)) and time.monotonic() < deadline_s:
+        time.sleep(_POLL_S)
+    return accounted
 
 
 def _accounted(stand: Stand, keyframes: int, poses: int) -> bool:
