@@ -38,7 +38,8 @@ class Swarm:
         """Let every robot send its next keyframe, of features."""
         for robot, x_m in ROBOTS.items():
             data = keyframe_bytes(robot, x_m, sequence=self.sent, boot=self.boot)
-            self.air.put(keys.keyframe("default", robot), data)
+            # Zenoh would rather drop one than wait, where the machine is busy.
+            self.air.put(keys.keyframe("default", robot), data, congestion_control=zenoh.CongestionControl.BLOCK)
         self.sent += 1
 
     def measured(self) -> list[tuple[str, str]]:
