@@ -42,6 +42,10 @@ def follow(previous: Grouping, clusters: Iterable[Members], next_label: int) -> 
     """
     ordered = sorted(clusters, key=lambda members: min(members))
     names = sorted(previous, key=_age)
+    known = {members: label for label, members in previous.items()}
+    if len(known) == len(ordered) and all(members in known for members in ordered):
+        # Most of the time nothing has changed.
+        return Following({known[members]: members for members in ordered}, next_label)
     inherited = _assign([previous[name] for name in names], ordered)
     groups: dict[str, Members] = {}
     for column, members in enumerate(ordered):
@@ -79,7 +83,11 @@ def _assign(old: Sequence[Members], new: Sequence[Members]) -> dict[int, int]:
     """Column of `new` -> row of `old` that it shares most robots with, over all as one assignment."""
     if not old or not new:
         return {}
-    shared = np.array([[len(before & after) for after in new] for before in old], np.float64)
+    row_of = {robot: row for row, members in enumerate(old) for robot in members}
+    shared = np.zeros((len(old), len(new)))
+    for column, members in enumerate(new):
+        for row in (row_of[robot] for robot in members if robot in row_of):
+            shared[row, column] += 1
     # Among equals the oldest label goes to the first cluster.
     order = np.add.outer(np.arange(len(old)), np.arange(len(new))) / (4 * (len(old) + len(new)) ** 2)
     rows, columns = linear_sum_assignment(shared - order, maximize=True)
