@@ -31,6 +31,7 @@ ROBOTS = 10
 _OFFERED = 1.1
 _SECONDS, _LONG_SECONDS = 10.0, 30.0
 _RAW_SECONDS = 3.0
+_COST_SECONDS = 4.0
 _LOOK_S = 1.0
 _DRAIN_S, _POLL_S = 10.0, 0.1
 
@@ -39,22 +40,12 @@ _row = partial(Row, bench="ingest")
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What came of a load: keyframe arrived to first groups with it, and messages of the flood a second, as received.
-
-    `cost_us` is what the station spent per message of the flood, over what it spends without; None where not known.
-    """
+    """What came of a load: from a keyframe to the first groups with it, and the flood as received, a second."""
 
     p50_ms: float
     rates: tuple[float, ...] = ()
     sent: int = 0
-    cpu_s: float | None = None
     accounted: bool = True
-
-    def cost_us(self, quiet: Run) -> float | None:
-        """Processor time of the station per message of the flood, over what it spends without one."""
-        if self.cpu_s is None or quiet.cpu_s is None or not self.sent:
-            return None
-        return 1e6 * (self.cpu_s - quiet.cpu_s) / self.sent
 
 
 def rows(long: bool) -> Iterator[Row]:
@@ -79,7 +70,7 @@ def rows(long: bool) -> Iterator[Row]:
     dirty = under_flood(seconds, "garbage", GARBAGE_PER_S)
     holds = dirty.p50_ms <= 2.0 * quiet.p50_ms and dirty.accounted
     yield _latency("garbage", dirty.p50_ms, quiet.p50_ms, f"<= 2 x quiet, beside {GARBAGE_PER_S} a second", holds=holds)
-    yield from _costs(quiet, flooded, dirty)
+    yield from _costs(_COST_SECONDS)
 
 
 def _latency(case: str, p50_ms: float, quiet_ms: float | None, mark: str, *, holds: bool) -> Row:
@@ -89,8 +80,8 @@ def _latency(case: str, p50_ms: float, quiet_ms: float | None, mark: str, *, hol
     )
 
 
-def _costs(quiet: Run, flooded: Run, dirty: Run) -> Iterator[Row]:
-    pose_us, garbage_us = flooded.cost_us(quiet), dirty.cost_us(quiet)
+def _costs(seconds: float) -> Iterator[Row]:
+    pose_us, garbage_us = costs_us(seconds, GARBAGE_PER_S)
     if pose_us is None or garbage_us is None:
         return
     yield _row(
@@ -103,6 +94,36 @@ def _costs(quiet: Run, flooded: Run, dirty: Run) -> Iterator[Row]:
         mark="processor time each, less than the peer",
         holds=garbage_us < pose_us,
     )
+
+
+def costs_us(seconds: float, rate: float) -> tuple[float | None, float | None]:
+    """Processor time that a station with nothing else to do spends per good pose and per piece of garbage.
+
+    None where the system does not say.
+    """
+    endpoint = free_endpoint()
+    kinds: tuple[flood.Kind, ...] = ("poses", "garbage")
+    with standing(LoadOptions(endpoint, seconds, robots=1)) as stand:
+        before_s = stand.cpu_s()
+        time.sleep(seconds)
+        idle_s = _spent(stand, before_s)
+        good_us, bad_us = (_cost_us(stand, FloodOptions(endpoint, seconds, kind, rate), idle_s) for kind in kinds)
+    return good_us, bad_us
+
+
+def _cost_us(stand: Stand, options: FloodOptions, idle_s: float | None) -> float | None:
+    with ExitStack() as stack:
+        flooder = _start(stack, flood.__name__, options)
+        before_s = stand.cpu_s()
+        flooder.line.send("go")
+        flooded = expect(flooder, Flooded)
+        spent_s = _spent(stand, before_s)
+    return None if spent_s is None or idle_s is None else 1e6 * max(0.0, spent_s - idle_s) / flooded.sent
+
+
+def _spent(stand: Stand, before_s: float | None) -> float | None:
+    after_s = stand.cpu_s()
+    return None if before_s is None or after_s is None else after_s - before_s
 
 
 def raw_rate(seconds: float = _RAW_SECONDS) -> float:
@@ -125,7 +146,6 @@ def under_flood(seconds: float, kind: flood.Kind | None = None, rate: float = 0.
         flooder = None
         if kind is not None:
             flooder = _start(stack, flood.__name__, FloodOptions(endpoint, seconds, kind, rate, robots))
-        before_s = stand.cpu_s()
         stand.go()
         rates: list[float] = []
         flooded = Flooded(0, 0.0)
@@ -135,13 +155,11 @@ def under_flood(seconds: float, kind: flood.Kind | None = None, rate: float = 0.
             flooded = expect(flooder, Flooded)
         keyframes = stand.sent()
         stand.settle()
-        after_s = stand.cpu_s()
-        spent_s = None if before_s is None or after_s is None else after_s - before_s
         p50_ms = stand.summary().latency_p50_ms
         if p50_ms is None:
             raise LoadError("no keyframe came as far as the groups")
         accounted = _drained(stand, keyframes, flooded.sent if kind == "poses" else 0)
-        return Run(p50_ms, tuple(rates), flooded.sent, spent_s, accounted)
+        return Run(p50_ms, tuple(rates), flooded.sent, accounted)
 
 
 def _start(stack: ExitStack, role: str, argument: object) -> Child:

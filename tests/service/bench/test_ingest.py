@@ -6,7 +6,6 @@ from covista_schemas import codec, keys
 from covista_schemas.errors import DecodeError
 from covista_schemas.zenoh_config import config
 from covista_service.bench import flood, ingest
-from covista_service.bench.ingest import Run
 from covista_service.demo import children
 
 from tests.service.deadline import free_endpoint
@@ -70,10 +69,6 @@ def test_a_flood_ends_with_its_parent() -> None:
         assert flooder.process.returncode is not None
 
 
-@pytest.mark.parametrize(("spent_s", "quiet_s", "us"), [(3.0, 1.0, 200.0), (None, 1.0, None), (1.0, None, None)])
-def test_what_a_message_costs_is_what_is_spent_beyond_quiet(
-    spent_s: float | None, quiet_s: float | None, us: float | None
-) -> None:
-    flooded, quiet = Run(1.0, (), 10_000, spent_s), Run(1.0, cpu_s=quiet_s)
-    assert flooded.cost_us(quiet) == us
-    assert quiet.cost_us(quiet) is None
+def test_what_a_message_costs_is_told_where_the_system_tells() -> None:
+    for cost_us in ingest.costs_us(1.0, 2000):
+        assert cost_us is None or 0 <= cost_us < 1000
