@@ -13,7 +13,7 @@ from covista_schemas import codec, keys
 from covista_schemas import robot_pb2 as pb
 from covista_schemas.errors import DecodeError, KeyExpressionError
 
-_MAX_IDS = 4096
+_MAX_IDS = 16_384
 
 
 class NameReader:

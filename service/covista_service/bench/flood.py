@@ -102,15 +102,15 @@ def poses(session: zenoh.Session, robots: int) -> Make:
 def garbage(session: zenoh.Session, robots: int) -> Make:
     """Garbage of every kind in turn; good robots are called b1, b2, ..."""
     chance = random.Random(0)
-    kinds = cycle(
-        [
-            _same([keys.pose(SITE, f"b{n + 1}") for n in range(robots)], chance.randbytes(_NOISE_BYTES)),
-            _same([keys.keyframe(SITE, f"x{n}") for n in range(_NAMES)], chance.randbytes(_NOISE_BYTES)),
-            _same([keys.pose(SITE, f"b{n + 1}") for n in range(robots)], _pose("somebody").SerializeToString()),
-            _wrong(session, robots),
-            _same([keys.pose(SITE, "long")], bytes(codec.MAX_POSE_BYTES + 1)),
-        ]
-    )
+    good = [keys.pose(SITE, f"b{number + 1}") for number in range(robots)]
+    short = [
+        _same(good, chance.randbytes(_NOISE_BYTES)),
+        _same([keys.keyframe(SITE, f"x{number}") for number in range(_NAMES)], chance.randbytes(_NOISE_BYTES)),
+        _same(good, _pose("somebody").SerializeToString()),
+        _wrong(session, robots),
+    ]
+    # Long ones are fewer: what they cost is the carrying of their bytes.
+    kinds = cycle([*short, *short, _same([keys.pose(SITE, "long")], bytes(codec.MAX_POSE_BYTES + 1))])
     return lambda _number: next(next(kinds))
 
 
