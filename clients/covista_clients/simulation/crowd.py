@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from covista_clients.simulation.stock import Shot, Stock
 from covista_clients.simulation.world import Floats
 
-# Between tiles: so far that those who cannot see each other need not be thought to. A station that does not know of
-# walls takes views to reach three times as deep as what it has seen: with less, robots of large crowds, which have
-# tiles on all sides, would have more neighbours than those of small ones, and no two sizes could be compared.
+# Between tiles. A station that does not know of walls takes views to reach three times as deep as what it has seen:
+# with less, robots of large crowds, which have tiles on all sides, would have more plausible neighbours than those of
+# small ones, and no two sizes could be compared.
 GAP_M = 48.0
 
 

@@ -23,10 +23,13 @@ from covista_service.demo.children import Line, end_soon
 from covista_service.demo.tidings import Failed, Ready
 from covista_service.loop import Loop
 from covista_service.station.groups import Groups
+from covista_service.station.workload import Workload
 from covista_service.telemetry import Summary, Telemetry
 
-READINGS = "readings"
+READINGS, WORKLOAD = "readings", "workload"
 _NS_PER_MS = 1e6
+# A station in distress may take its time.
+_ASK_S = 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +38,7 @@ class Readings:
 
     `cpu_s` is of the whole process, `regrouping_s` of it the time that similarity and groups took to evaluate.
     `latencies_ms` since: (when the keyframe arrived, s since the epoch, and how long until it was in the groups);
-    `turns_ms` since: how long turns of the loop took.
+    `turns_ms` since: how long turns of the loop took. `workload` is what waits now, and was begun since the start.
     """
 
     at_s: float
@@ -43,6 +46,7 @@ class Readings:
     regrouping_s: float
     resident_bytes: int
     summary: Summary
+    workload: Workload
     latencies_ms: tuple[tuple[float, float], ...]
     turns_ms: tuple[float, ...]
 
@@ -52,6 +56,8 @@ class _Instruments:
         self._regrouping_ns = 0
         self._turns_ms: deque[float] = deque()
         self._latencies_ms: deque[tuple[float, float]] = deque()
+        self._loop: Loop | None = None
+        self._meet_loop()
         self._watch(Groups, "evaluate", time.thread_time_ns, self._regrouped)
         self._watch(Loop, "turn", time.perf_counter_ns, lambda taken_ns: self._turns_ms.append(taken_ns / _NS_PER_MS))
         plain = Telemetry.grouped
@@ -71,12 +77,27 @@ class _Instruments:
             regrouping_s=self._regrouping_ns / 1e9,
             resident_bytes=_resident_bytes(),
             summary=summary,
+            workload=self.workload(),
             latencies_ms=tuple(_emptied(self._latencies_ms)),
             turns_ms=tuple(_emptied(self._turns_ms)),
         )
 
+    def workload(self) -> Workload:
+        """What waits now, and was begun since the start."""
+        return Workload() if self._loop is None else self._loop.ask(_ASK_S).workload
+
     def _regrouped(self, taken_ns: int) -> None:
         self._regrouping_ns += taken_ns
+
+    def _meet_loop(self) -> None:
+        plain = Loop.run
+
+        @functools.wraps(plain)
+        async def run(loop: Loop) -> None:
+            self._loop = loop
+            await plain(loop)
+
+        setattr(Loop, "run", run)  # noqa: B010 - a method is put in place of another
 
     def _watch(self, owner: type, name: str, clock: Callable[[], int], note: Callable[[int], None]) -> None:
         plain = getattr(owner, name)
@@ -93,7 +114,7 @@ class _Instruments:
 
 
 def play(line: Line, settings: Settings) -> None:
-    """Serve. Says `Ready` or `Failed`, answers `READINGS` with `Readings` and all else with `Summary`."""
+    """Serve. Says `Ready` or `Failed`; answers `READINGS` and `WORKLOAD` with those, all else with `Summary`."""
     telemetry.log_to_stderr(settings.log_level)
     instruments = _Instruments()
 
@@ -109,8 +130,10 @@ def play(line: Line, settings: Settings) -> None:
 
 def _answer(line: Line, running: serve.Running, instruments: _Instruments) -> None:
     while (word := line.receive()) is not None:
-        summary = running.summary()
-        line.send(instruments.read(summary) if word == READINGS else summary)
+        if word == READINGS:
+            line.send(instruments.read(running.summary()))
+        else:
+            line.send(instruments.workload() if word == WORKLOAD else running.summary())
     end_soon()
     running.stop()
 

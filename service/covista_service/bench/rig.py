@@ -15,18 +15,22 @@ from covista_clients.simulation.marching import March
 from covista_schemas.errors import CovistaError
 
 from covista_service.bench import instruments, load
-from covista_service.bench.instruments import READINGS, Readings
+from covista_service.bench.instruments import READINGS, WORKLOAD, Readings
 from covista_service.bench.load import LoadOptions, Prepared, Sent
 from covista_service.config import Settings
 from covista_service.demo import children
 from covista_service.demo.children import Child
 from covista_service.demo.tidings import Failed, Ready
 from covista_service.demo.watch import Watch
+from covista_service.station.workload import Workload
 from covista_service.telemetry import Summary
 
 _DRAIN_S = 5.0
 _WARM_S = 120.0
 _POLL_S = 0.1
+# Looks in a row.
+_IDLE = 3
+_LIKELY, _SWEEP = ("regular", "moved"), "sweep"
 _T = TypeVar("_T")
 
 
@@ -38,7 +42,8 @@ class LoadError(CovistaError):
 class Window:
     """What a station did in a stretch of time, `seconds` long, and what was sent to it meanwhile.
 
-    Latencies run from a keyframe's arrival to the first groups evaluated with a survey of it.
+    `sweeps` are those of the surveys that were tried once in a while, of pairs that are not likely to meet. Latencies
+    run from a keyframe's arrival to the first groups evaluated with a survey of it.
     """
 
     seconds: float
@@ -46,6 +51,7 @@ class Window:
     poses: int
     behind_s: float
     surveys: int
+    sweeps: int
     cpu_s: float
     regrouping_s: float
     latencies_ms: tuple[float, ...]
@@ -106,6 +112,7 @@ class Rig:
             poses=done.poses - sent.poses,
             behind_s=done.behind_s,
             surveys=after.summary.surveys - before.summary.surveys,
+            sweeps=after.workload.started.get(_SWEEP, 0) - before.workload.started.get(_SWEEP, 0),
             cpu_s=after.cpu_s - before.cpu_s,
             regrouping_s=after.regrouping_s - before.regrouping_s,
             latencies_ms=tuple(latency_ms for _, latency_ms in after.latencies_ms),
@@ -113,10 +120,16 @@ class Rig:
         ), done
 
     def settle(self, timeout_s: float = _DRAIN_S) -> bool:
-        """Wait until nothing is under way for a moment; False after `timeout_s`."""
+        """Wait until for a moment no likely pair waits, and hands are idle; False after `timeout_s`.
+
+        One may be busy: the sweep never ends.
+        """
         deadline_s, idle = time.monotonic() + timeout_s, 0
-        while idle < 3:
-            idle = 0 if self.summary().under_way else idle + 1
+        while idle < _IDLE:
+            self.station.line.send(WORKLOAD)
+            load = expect(self.station, Workload)
+            waiting = sum(load.waiting.get(queue, 0) for queue in _LIKELY)
+            idle = 0 if waiting or self.summary().under_way > 1 else idle + 1
             if time.monotonic() > deadline_s:
                 return False
             time.sleep(_POLL_S)

@@ -46,8 +46,13 @@ class Size:
 
     @property
     def surveys(self) -> list[float]:
-        """Surveys a keyframe, by window."""
-        return [window.surveys / window.keyframes for window in self.windows]
+        """Surveys a keyframe, by window, without the sweep, which goes by the second."""
+        return [(window.surveys - window.sweeps) / window.keyframes for window in self.windows]
+
+    @property
+    def sweeps(self) -> list[float]:
+        """Surveys of the sweep a second, by window."""
+        return [window.sweeps / window.seconds for window in self.windows]
 
     @property
     def cpu_ms(self) -> list[float]:
@@ -112,6 +117,7 @@ def _rows(size: Size) -> Iterator[Row]:
     matched_ms = median(brute_force_ms(load.stock(size.robots, _FEATURES))) * median(size.surveys)
     name = f"n{size.robots}"
     yield replace(_row(f"surveys_{name}", size.surveys, "surveys"), mark=_SETTLED, holds=size.settled)
+    yield _row(f"sweeps_{name}", size.sweeps, "surveys/s")
     yield _row(f"cpu_{name}", size.cpu_ms, "ms", peer_median=matched_ms)
     yield _row(f"regrouping_{name}", size.regrouping_ms, "ms")
     yield _row(f"p50_{name}", size.latency_ms(0.5), "ms")

@@ -11,7 +11,8 @@ def window(surveys: int, cpu_s: float, regrouping_s: float = 0.0) -> Window:
         keyframes=10,
         poses=0,
         behind_s=0.0,
-        surveys=surveys,
+        surveys=surveys + 6,
+        sweeps=6,
         cpu_s=cpu_s,
         regrouping_s=regrouping_s,
         latencies_ms=(40.0, 60.0, 50.0),
@@ -27,6 +28,7 @@ def size(robots: int, surveys: int, cpu_s: float, regrouping_s: float = 0.0, *, 
 def test_work_is_counted_by_keyframe_and_regrouping_apart() -> None:
     measured = size(50, 40, 1.5, 0.5)
     assert measured.surveys == [4.0] * 3
+    assert measured.sweeps == [3.0] * 3
     assert measured.cpu_ms == pytest.approx([100.0] * 3)
     assert measured.regrouping_ms == pytest.approx([50.0] * 3)
     assert measured.latency_ms(0.5) == [50.0] * 3
