@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from covista_service.perception.camera import Pose
 from covista_service.perception.scene import Evidence, Settled, Sight
 from covista_service.station.agreements import Agreements
 from covista_service.station.events import BuildSurfaces, Keyframe, KeyframeId, SurfacesBuilt
+from covista_service.station.options import NS_PER_S
 from covista_service.station.outlook import Outlook, depths_m, view_of
 from covista_service.station.scales import Scales
 from covista_service.station.study import Study
 from covista_service.station.testimony import Names, Testimony, contradicts, matched
+
+# What further surveys tell of a keyframe that has a surface is put into it together: when hands have nothing else to
+# do, or after so long.
+_TOGETHER_NS = 3 * NS_PER_S // 10
 
 
 class Outlooks:
@@ -24,8 +29,8 @@ class Outlooks:
     def __init__(self) -> None:
         self._studies: dict[str, Study] = {}
         self._testimony = Testimony()
-        # Robots whose surface is to be built anew, keyframes at a worker, and jobs under way.
-        self._stale: dict[str, None] = {}
+        # Robots whose surface is to be built anew, since when; keyframes at a worker, and jobs under way.
+        self._stale: dict[str, int] = {}
         self._at_work: dict[str, KeyframeId] = {}
         self._agreements = Agreements()
         self.scales = Scales()
@@ -57,7 +62,7 @@ class Outlooks:
         self._retire(held.keyframe.id)
         return study.partner()
 
-    def surveyed(self, first: KeyframeId, second: KeyframeId, evidence: Evidence | None) -> None:
+    def surveyed(self, first: KeyframeId, second: KeyframeId, evidence: Evidence | None, now_ns: int) -> None:
         """Take what a survey found, None if it failed; surfaces of its keyframes still in use are to be built anew."""
         current = [name for name in (first, second) if self._current(name)]
         if evidence is not None and current:
@@ -65,23 +70,29 @@ class Outlooks:
             if len(current) == 2 and evidence.link is not None and self._as_reported(*current):
                 self._agreements.note(first, second, agree=not evidence.link.contradicts)
         for name in current:
-            self._stale.setdefault(name.robot)
+            self._stale.setdefault(name.robot, now_ns)
 
     def pose(self, keyframe: Keyframe) -> Pose:
         """The pose that stands for a keyframe."""
         study = self._studies.get(keyframe.id.robot)
         return keyframe.pose if study is None else study.pose_of(keyframe)
 
-    def start(self, hands: int) -> list[BuildSurfaces]:
-        """At most so many jobs, under way from now on. Two robots whose images contradict each other go together."""
+    def start(self, hands: int, now_ns: int, urgent: Callable[[KeyframeId], bool] | None = None) -> list[BuildSurfaces]:
+        """At most so many jobs, under way from now on. Two robots whose images contradict each other go together.
+
+        With `urgent` only surfaces of keyframes that have none of their own, or that it says this of, or that have
+        waited for long.
+        """
         if hands <= 0:
             return []
         jobs: list[BuildSurfaces] = []
         for robot in list(self._stale):
             if len(jobs) >= hands:
                 break
+            if not self._presses(robot, now_ns, urgent):
+                continue
             if robot in self._stale and robot not in self._at_work and not self._waits(robot):
-                together = [robot, *self._fresh_partner(robot)]
+                together = [robot, *self._fresh_partner(robot, now_ns, urgent)]
                 for one in together:
                     self._stale.pop(one, None)
                     self._at_work[one] = self._studies[one].keyframe.id
@@ -142,6 +153,12 @@ class Outlooks:
                 self._testimony.drop(names)
                 self._studies[other.robot].lay_beside(name, said.observed[side])
 
+    def _presses(self, robot: str, now_ns: int, urgent: Callable[[KeyframeId], bool] | None) -> bool:
+        since_ns, study = self._stale.get(robot, now_ns), self._studies[robot]
+        fresh = study.outlook is None or study.outlook.keyframe is not study.keyframe
+        waited = not 0 <= now_ns - since_ns < _TOGETHER_NS
+        return urgent is None or fresh or waited or urgent(study.keyframe.id)
+
     def _waits(self, robot: str) -> bool:
         """Is one whose images contradict this robot's at a worker? The two are settled together, or not at all."""
         beside = self._testimony.beside(self._studies[robot].keyframe.id)
@@ -149,11 +166,12 @@ class Outlooks:
             other.robot != robot and other.robot in self._at_work and contradicts(said) for other, said in beside
         )
 
-    def _fresh_partner(self, robot: str) -> list[str]:
+    def _fresh_partner(self, robot: str, now_ns: int, urgent: Callable[[KeyframeId], bool] | None) -> list[str]:
         """Another robot that is stale too, by a survey of the two that no surface has been built with yet."""
         for name, said in self._testimony.beside(self._studies[robot].keyframe.id):
             other = name.robot
-            if said.observed is None and other != robot and other in self._stale and other not in self._at_work:
+            ready = said.observed is None and other != robot and other in self._stale and other not in self._at_work
+            if ready and (contradicts(said) or self._presses(other, now_ns, urgent)):
                 return [other]
         return []
 

@@ -77,14 +77,16 @@ class Surveys:
         return self.neighbourhoods.judge(now_ns)
 
     def start(self, now_ns: int) -> list[Effect]:
-        """As many surfaces, and then surveys, as there are hands for."""
+        """As many jobs as there are hands for: surfaces that are missing, surveys, then surfaces that can be better."""
         started: list[Effect] = []
-        started += self._outlooks.start(self._capacity - self._outlooks.under_way)
+        started += self._outlooks.start(self._capacity - self._outlooks.under_way, now_ns, self._compared.__contains__)
         while self._agenda.under_way_count + self._outlooks.under_way < self._capacity:
             keyframes = self._agenda.start(now_ns)
             if keyframes is None:
                 break
             started.append(self._survey(*keyframes))
+        idle = self._capacity - self._agenda.under_way_count - self._outlooks.under_way
+        started += self._outlooks.start(idle, now_ns)
         return started
 
     def take(self, event: SurveyDone | SurfacesBuilt, now_ns: int) -> list[Happened]:
@@ -130,7 +132,8 @@ class Surveys:
         keyframes = self._agenda.done(event.first, event.second)
         if keyframes is None or any(robot not in self._roster for robot in pair):
             return []
-        self._outlooks.surveyed(event.first, event.second, None if event.found is None else Evidence.of(event.found))
+        evidence = None if event.found is None else Evidence.of(event.found)
+        self._outlooks.surveyed(event.first, event.second, evidence, now_ns)
         if pair[0] != pair[1]:
             self._compared.update(
                 name for name in (event.first, event.second) if name in self._unseen.get(name.robot, ())
