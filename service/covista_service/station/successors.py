@@ -20,18 +20,23 @@ class Successors:
 
     def __init__(self) -> None:
         self._waiting: dict[str, Keyframe] = {}
+        # Since when there has been one, whichever: a newer one that takes the place does not begin anew.
+        self._since_ns: dict[str, int] = {}
 
     def __getitem__(self, robot: str) -> Keyframe | None:
         return self._waiting.get(robot)
 
     def wait(self, keyframe: Keyframe) -> Keyframe | None:
         """Let a keyframe wait in its robot's place; the older one whose place it takes."""
-        older = self._waiting.get(keyframe.id.robot)
-        self._waiting[keyframe.id.robot] = keyframe
+        robot = keyframe.id.robot
+        older = self._waiting.get(robot)
+        self._waiting[robot] = keyframe
+        self._since_ns.setdefault(robot, keyframe.arrived_ns)
         return older
 
     def withdraw(self, robot: str) -> Keyframe | None:
         """Take away a robot's waiting keyframe, if it has one."""
+        self._since_ns.pop(robot, None)
         return self._waiting.pop(robot, None)
 
     def due(self, busy: Callable[[str], bool], now_ns: int) -> list[Keyframe]:
@@ -39,8 +44,8 @@ class Successors:
         due = [
             keyframe
             for robot, keyframe in self._waiting.items()
-            if not 0 <= now_ns - keyframe.arrived_ns < _LONGEST_NS or not busy(robot)
+            if not 0 <= now_ns - self._since_ns[robot] < _LONGEST_NS or not busy(robot)
         ]
         for keyframe in due:
-            del self._waiting[keyframe.id.robot]
+            self.withdraw(keyframe.id.robot)
         return due

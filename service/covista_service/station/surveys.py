@@ -79,15 +79,19 @@ class Surveys:
     def start(self, now_ns: int) -> list[Effect]:
         """As many jobs as there are hands for: surfaces that are missing, surveys, then surfaces that can be better."""
         started: list[Effect] = []
-        started += self._outlooks.start(self._capacity - self._outlooks.under_way, now_ns, self._compared.__contains__)
-        while self._agenda.under_way_count + self._outlooks.under_way < self._capacity:
+        started += self._outlooks.start(self._idle, now_ns, self._compared.__contains__)
+        while self._idle > 0:
             keyframes = self._agenda.start(now_ns)
             if keyframes is None:
                 break
             started.append(self._survey(*keyframes))
-        idle = self._capacity - self._agenda.under_way_count - self._outlooks.under_way
-        started += self._outlooks.start(idle, now_ns)
+        started += self._outlooks.start(self._idle, now_ns)
         return started
+
+    @property
+    def _idle(self) -> int:
+        """Hands that have nothing to do."""
+        return self._capacity - self._agenda.under_way_count - self._outlooks.under_way
 
     def take(self, event: SurveyDone | SurfacesBuilt, now_ns: int) -> list[Happened]:
         """Take in what a worker has found."""

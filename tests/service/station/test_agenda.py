@@ -2,9 +2,10 @@
 
 from collections import Counter
 from itertools import combinations
+from random import Random
 
 import pytest
-from covista_service.station.events import ExtractFeatures, SurveyPair
+from covista_service.station.events import BuildSurfaces, ExtractFeatures, SurveyPair, Tick
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -40,6 +41,27 @@ def test_there_are_never_more_surveys_under_way_than_hands(capacity: int, robots
         if under_way and turn % 2:
             done = under_way.pop(0)
             scene.done(done, measured())
+
+
+@given(capacity=st.integers(1, 4), seed=st.integers(0, 99))
+@settings(max_examples=15, deadline=None)
+def test_there_are_never_more_surveys_and_surfaces_under_way_than_hands(capacity: int, seed: int) -> None:
+    scene, chance = Scene.of(capacity=capacity), Random(seed)
+    under_way: list[SurveyPair | BuildSurfaces] = []
+    built = 0
+    for turn in range(60):
+        scene.send(f"r{turn % 5}", pose(0.1 * turn))
+        scene.now_ns += chance.randrange(400_000_000)
+        under_way += [effect for effect in scene.receive(Tick()) if isinstance(effect, SurveyPair | BuildSurfaces)]
+        assert len(under_way) <= capacity
+        for _ in range(chance.randrange(len(under_way) + 1)):
+            job = under_way.pop(chance.randrange(len(under_way)))
+            if isinstance(job, SurveyPair):
+                scene.done(job, measured())
+            else:
+                built += 1
+                scene.receive(scene.wall_ahead(job))
+    assert built > 5
 
 
 def test_a_survey_under_way_does_not_hold_up_other_pairs() -> None:
