@@ -27,13 +27,14 @@ GRAIN_S = 0.005
 class March:
     """How often each robot sends a keyframe and a pose, and for how long; without `seconds` until told otherwise.
 
-    `first_step` is how far robots have come before, in keyframes.
+    `first_step` is how far robots have come before, in keyframes: with 2.5 half of them have sent three, and it is the
+    turn of the others, who have sent two.
     """
 
     rate_hz: float
     pose_rate_hz: float = 1.0
     seconds: float | None = None
-    first_step: int = 0
+    first_step: float = 0.0
 
 
 def is_crowd(options: SwarmOptions) -> bool:
@@ -119,8 +120,10 @@ class _Marching:
         if self.progress.behind_s > period_s or not self.raised.heard:
             self.progress.skipped += 1
             return
-        robot = self.turns[due.robot]
-        step = self.plan.first_step + max(0.0, due.t_s * self.plan.rate_hz - due.robot / self.crowd.robots)
+        robots = self.crowd.robots
+        turn = (due.robot + round(self.plan.first_step * robots)) % robots
+        robot = self.turns[turn]
+        step = max(0.0, self.plan.first_step + due.t_s * self.plan.rate_hz - turn / robots)
         time_ns = self.begin_ns + round(due.t_s * 1e9)
         if due.is_keyframe:
             number = round(step)

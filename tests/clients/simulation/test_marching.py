@@ -98,6 +98,16 @@ def test_a_march_goes_on_where_the_one_before_ended(ground: Ground, raised: Ante
         assert sent.poses[name][0].pose.position_m == at[2]
 
 
+def test_a_march_that_ends_between_turns_goes_on_with_those_whose_turn_it_is(ground: Ground, raised: Antenna) -> None:
+    for first_step in (0.0, 0.5, 1.0, 1.5):
+        march(CROWD, raised, March(1.0, 0.0, 0.5, first_step), AtOnce(), BEGIN_NS + round(first_step * 1e9))
+    sent = Sent(ground, 40, 0)
+    for robot, name in enumerate(CROWD.names):
+        assert [keyframe.sequence for keyframe in sent.keyframes[name]] == [0, 1]
+        at = [keyframe.pose.position_m for keyframe in sent.keyframes[name]]
+        assert at == [CROWD.pose(robot, step).position_m for step in range(2)]
+
+
 def test_what_falls_due_while_it_sleeps_goes_out_together() -> None:
     pace = RealTime(threading.Event(), grain_s=0.02)
     assert pace.wait_until(0.001)
