@@ -9,7 +9,6 @@ from itertools import islice
 import numpy as np
 
 from covista_service.perception.camera import Pose
-from covista_service.perception.comparison import Outcome
 from covista_service.perception.frustum import Frusta
 from covista_service.station.agenda import Agenda
 from covista_service.station.corrections import Corrections
@@ -19,7 +18,7 @@ from covista_service.station.groups import Groups
 from covista_service.station.horizon import Horizon
 from covista_service.station.options import StationOptions, nanoseconds
 from covista_service.station.outlook import Outlook
-from covista_service.station.pairs import Answer, Judged, Pairs, apart, pair_of
+from covista_service.station.pairs import FAILED, NOT_SURVEYED, Answer, Judged, Pairs, apart, pair_of
 from covista_service.station.reach import Reach, depth_of, farthest_m
 from covista_service.station.roster import Robot, Roster
 
@@ -103,6 +102,10 @@ class Neighbourhoods:
         for robot, keyframe in judged:
             self._judge(robot, keyframe, now_ns)
         return [robot.id for robot in robots]
+
+    def take_up(self, pair: Pair) -> None:
+        """A survey of a pair is in: what stood for those who share nothing stands until surfaces are built."""
+        self._pairs.meet(pair, self._apart(*pair))
 
     def look_over(self, pair: Pair) -> None:
         """A survey that verifies a pair makes it worth reading; one that does not ends what was kept for that alone."""
@@ -216,7 +219,9 @@ class Neighbourhoods:
     def _apart(self, robot: str, other: str) -> Answer | None:
         """What stands for two robots as those whose views cannot meet, as they were judged last."""
         first, second = (self._judged.get(name) for name in pair_of(robot, other))
-        return None if first is None or second is None else apart(first, second)
+        if first is None or second is None or (robot in self._lapsed and other in self._lapsed):
+            return None
+        return apart(first, second)
 
     def _meet(self, pair: Pair, answer: Answer | None) -> None:
         self._pairs.meet(pair, answer)
@@ -261,13 +266,13 @@ class Neighbourhoods:
     def _worth_another_look(self, pair: Pair) -> bool:
         """Do images say that there is something in common? They outrank what poses and depths say of views.
 
-        What was seen in common before is looked at again, if only to find that it is no more.
+        What the last survey came to holds until another says otherwise, whatever keyframes and surfaces come between.
+        Without any, what was seen in common before is looked at again.
         """
         record = self._pairs[pair]
-        keyframes = [self._roster[robot].keyframe for robot in pair]
-        if record.surveyed == tuple(keyframe and keyframe.id for keyframe in keyframes):
-            return record.outcome == Outcome.MEASURED
-        return record.measured and sum(self._pairs.overlaps(pair) or ()) > 0
+        if record.outcome in (NOT_SURVEYED, FAILED) and not record.verified:
+            return record.measured and sum(self._pairs.overlaps(pair) or ()) > 0
+        return record.verified
 
 
 def _discard(places: dict[str, dict[str, None]], robot: str, other: str) -> None:

@@ -9,7 +9,7 @@ from covista_schemas.reports import FoundBy
 
 from covista_service.perception.camera import Pose
 from covista_service.perception.certainty import Interval
-from covista_service.perception.comparison import Comparison
+from covista_service.perception.comparison import Comparison, Outcome
 from covista_service.perception.visibility import SAME_SCALE
 from covista_service.station.ages import Ages
 from covista_service.station.events import Keyframe, KeyframeId, Pair
@@ -66,7 +66,8 @@ class Answer:
 class PairRecord:
     """One pair: the answer in force, the last survey, what it came to, and the keyframes it was made on.
 
-    `expired` is an answer that has grown too old: read again from the same surfaces it does not come back.
+    `expired` is an answer that has grown too old: read again from the same surfaces it does not come back. `verified`:
+    the last survey that did not fail has found something in common.
     """
 
     answer: Answer | None = None
@@ -74,6 +75,7 @@ class PairRecord:
     outcome: str = NOT_SURVEYED
     surveyed: tuple[KeyframeId, KeyframeId] | None = None
     expired: Answer | None = None
+    verified: bool = False
 
     @property
     def measured(self) -> bool:
@@ -150,8 +152,11 @@ class Pairs:
     def surveyed(self, first: Keyframe, second: Keyframe, compared: Comparison | None) -> None:
         """Enter what a survey came to, None if it failed; the answer stands until surfaces are built with it."""
         pair = (first.id.robot, second.id.robot)
+        record, surveyed = self[pair], (first.id, second.id)
         outcome = FAILED if compared is None else str(compared.outcome)
-        self._put(pair, replace(self[pair], compared=compared, outcome=outcome, surveyed=(first.id, second.id)))
+        verified = record.verified if compared is None else outcome == Outcome.MEASURED
+        record = replace(record, compared=compared, outcome=outcome, surveyed=surveyed, verified=verified)
+        self._put(pair, record)
 
     def enter(self, pair: Pair, answer: Answer) -> bool:
         """Enter the overlap as read from what is known now; True if the last one was read from the same surfaces.
@@ -168,7 +173,9 @@ class Pairs:
             if answer.computed_ns != held.computed_ns:
                 answer = replace(answer, computed_ns=held.computed_ns)
             # Written out: several thousand times a second, `replace` can be felt.
-            self._records[pair] = PairRecord(answer, record.compared, record.outcome, record.surveyed, record.expired)
+            self._records[pair] = PairRecord(
+                answer, record.compared, record.outcome, record.surveyed, record.expired, record.verified
+            )
             self._copy = None
             return again
         self._put(pair, replace(record, answer=answer, expired=None))

@@ -142,6 +142,7 @@ class Surveys:
             self._compared.update(
                 name for name in (event.first, event.second) if name in self._unseen.get(name.robot, ())
             )
+            self.neighbourhoods.take_up(pair)
             self._pairs.surveyed(*keyframes, event.found)
             self.neighbourhoods.look_over(pair)
             self._agenda.again(pair)

@@ -8,6 +8,7 @@ import pytest
 from covista_schemas.reports import FoundBy
 from covista_service.perception.camera import Pose
 from covista_service.perception.surface import flat
+from covista_service.station.events import SurveyPair
 from covista_service.station.horizon import Horizon
 from covista_service.station.outlook import Outlook
 from covista_service.station.pairs import pair_of
@@ -15,7 +16,7 @@ from covista_service.station.station import Station
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.service.station.scenes import AHEAD, BACK, NOTHING, Scene, measured, pose, surveys
+from tests.service.station.scenes import AHEAD, BACK, NOTHING, S, Scene, measured, pose, surveys
 
 places = st.tuples(st.integers(0, 9), st.floats(0, 60), st.floats(0, 60), st.floats(-np.pi, np.pi), st.booleans())
 
@@ -267,3 +268,69 @@ def test_surveys_of_a_keyframe_are_no_more_in_a_larger_swarm() -> None:
         return len([pair for pair in surveys(scene.settle(lambda job: NOTHING)) if pair in scene.snapshot.records])
 
     assert surveys_of_one(20) == surveys_of_one(60) > 0
+
+
+def astray(count: int = 2) -> Scene:
+    """Robots whose poses say that two sides look apart, and whose images all show the same; each has its keyframe."""
+    scene = Scene.of(capacity=4, retry_after_s=1.0, gone_after_s=1000)
+    for number in range(count):
+        scene.send(f"a{number}", pose(number, AHEAD))
+        scene.send(f"b{number}", pose(number, BACK))
+    return scene
+
+
+def across(scene: Scene) -> set[tuple[str, str]]:
+    return {pair for pair in scene.snapshot.records if pair[0][0] != pair[1][0]}
+
+
+def test_what_images_have_found_in_common_is_kept_until_images_say_otherwise() -> None:
+    scene = astray()
+    scene.settle()
+    for _ in range(3):
+        scene.work(scene.wait(1))
+    everyone = {(f"a{i}", f"b{k}") for i in range(2) for k in range(2)}
+    assert across(scene) == everyone
+    for _ in range(4):
+        scene.now_ns += S
+        for number in range(2):
+            scene.send(f"a{number}", pose(number, AHEAD))
+            scene.send(f"b{number}", pose(number, BACK))
+        # First surfaces come from other pairs, and those across have a turn in which workers fail.
+        scene.settle(lambda job: measured() if job.first.robot[0] == job.second.robot[0] else None)
+        assert across(scene) == everyone
+    scene.now_ns += S
+    for number in range(2):
+        scene.send(f"a{number}", pose(number, AHEAD))
+    scene.settle(lambda job: measured() if job.first.robot[0] == job.second.robot[0] else NOTHING)
+    assert across(scene) == set()
+
+
+@pytest.mark.parametrize("found", [True, False])
+def test_a_survey_whose_keyframe_was_replaced_meanwhile_counts_as_it_came_out(found: bool) -> None:
+    scene = Scene.of(capacity=1, retry_after_s=1.0)
+    scene.send("a0", pose(0, AHEAD))
+    scene.send("b0", facing(0, -50, np.pi))
+    (sweep,) = [job for job in scene.tick() if isinstance(job, SurveyPair)]
+    for _ in range(2):
+        # It waits for two seconds at most.
+        scene.send("a0", pose(0, AHEAD))
+        scene.wait(3)
+    assert scene.snapshot.robots["a0"].keyframe != sweep.first
+    scene.done(sweep, measured() if found else NOTHING)
+    assert (("a0", "b0") in scene.snapshot.records) is found
+    assert ("b0" in partners(scene.station, "a0")) is found
+
+
+def test_what_the_sweep_has_found_shares_nothing_as_before_until_surfaces_tell() -> None:
+    scene = Scene.of(capacity=1, retry_after_s=1.0)
+    scene.send("a0", pose(0, AHEAD))
+    scene.send("b0", facing(0, -50, np.pi))
+    (sweep,) = [job for job in scene.tick() if isinstance(job, SurveyPair)]
+    before = scene.snapshot.pair("a0", "b0")
+    assert (before.overlap_a, before.found_by) == (0.0, FoundBy.PREDICTED)
+    scene.done(sweep, measured())
+    after = scene.snapshot.pair("a0", "b0")
+    assert (after.overlap_a, after.found_by, after.age_s) == (0.0, FoundBy.PREDICTED, before.age_s)
+    assert after.keyframe_a is before.keyframe_a
+    scene.tick()
+    assert scene.snapshot.pair("a0", "b0").found_by is FoundBy.IMAGE
