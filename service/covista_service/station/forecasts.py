@@ -25,8 +25,8 @@ from covista_service.station.roster import Fix, Robot, Roster
 
 # The overlaps of pairs of prospects, as `prospects.read` tells them.
 Read = Callable[[Sequence[Prospect], NDArray[np.integer], Sequence[Ratios], Sequence[int]], list[Answer]]
-# Robots whose views may meet that of one that is at another pose than that of its newest keyframe.
-Meeting = Callable[[str, Pose], Sequence[str]]
+# Robots whose views may meet that of one that is at a pose far from its newest keyframe's; None: it is not.
+Meeting = Callable[[str, Pose | None], Sequence[str]]
 # A robot has moved if it has turned by so much, or gone by so large a share of the median depth that it sees.
 _TURNED_RAD, _GONE_SHARE = math.radians(1.0), 0.02
 # So many times that far from where its keyframe was taken, a robot may meet others than from there.
@@ -139,12 +139,14 @@ class Forecasts:
     def _beside(self, robot: str) -> list[str]:
         """All that something is known with, and, where a robot is far from its keyframe, all that its view may meet."""
         beside = dict.fromkeys(self._pairs.beside(robot))
+        return sorted(beside | dict.fromkeys(self._meeting(robot, self._far(robot))))
+
+    def _far(self, robot: str) -> Pose | None:
+        """Where a robot is that is far from where its keyframe was taken."""
         source, known = self._outlooks[robot], self._roster[robot]
-        if source is not None and known.fix is not None and known.keyframe is not None:
-            pose = known.fix.pose
-            if _apart(known.keyframe.pose, pose, source, _FAR):
-                beside.update(dict.fromkeys(self._meeting(robot, pose)))
-        return sorted(beside)
+        if source is None or known.fix is None or known.keyframe is None:
+            return None
+        return known.fix.pose if _apart(known.keyframe.pose, known.fix.pose, source, _FAR) else None
 
     def _read(self, wanted: dict[str, list[str]], whole: Sequence[str], now_ns: int | None) -> int:
         """Read robots with their partners, and how many pairs that were; at `now_ns` from surfaces that are new.

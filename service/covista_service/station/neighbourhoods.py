@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from itertools import islice
+from itertools import islice, product
 
 import numpy as np
 
@@ -59,6 +59,9 @@ class Neighbourhoods:
         self._later: dict[str, None] = {}
         self._reaches: dict[str, Reach] = {}
         self._grid = Grid()
+        # Of robots that are far from where their keyframes were taken: what they see from where they stand.
+        self._standing: dict[str, Reach] = {}
+        self._ground = Grid()
         self._horizon = Horizon()
         self._judged: dict[str, Judged] = {}
         # By age, the oldest first; and those too old for a pair of two such to stand for anything.
@@ -112,16 +115,25 @@ class Neighbourhoods:
         reaches = self._reaches[pair[0]], self._reaches[pair[1]]
         if reaches[0].frustum.may_meet(reaches[1].frustum) or self._worth_another_look(pair):
             self._meet(pair, None)
+        elif self._stand_together(pair):
+            self._agenda.judge(pair, plausible=False)
         else:
             self._part(pair)
 
-    def beside(self, robot: str, pose: Pose) -> list[str]:
-        """Robots whose views may meet this one's when it is at another pose; nobody while it has not been judged."""
+    def beside(self, robot: str, pose: Pose | None) -> list[str]:
+        """Robots whose views may meet this one's now that it is far from its keyframe, at this pose.
+
+        None while it is not, nor to be held against others there. Nobody while it has not been judged.
+        """
         reach = self._reaches.get(robot)
-        if reach is None:
+        if reach is None or pose is None:
+            self._step_back(robot)
             return []
         keyframe = replace(reach.keyframe, pose=pose)
-        return self._meeting(robot, Reach.of(keyframe, reach.depth, self._horizon.farthest_m, self._corrections[robot]))
+        there = Reach.of(keyframe, reach.depth, self._horizon.farthest_m, self._corrections[robot])
+        self._standing[robot] = there
+        self._ground.put(robot, there.box)
+        return list(dict.fromkeys(self._meeting(robot, there) + self._around(robot)))
 
     def place(self, robot: str) -> None:
         """A robot takes part in the groups from now on, with all that is known of its pairs."""
@@ -152,6 +164,7 @@ class Neighbourhoods:
         self._later.pop(robot, None)
         self._reaches.pop(robot, None)
         self._grid.remove(robot)
+        self._step_back(robot)
         self._horizon.forget(robot)
         for places in (self._judged, self._ageing, self._lapsed):
             places.pop(robot, None)
@@ -166,41 +179,56 @@ class Neighbourhoods:
         self._reaches[robot.id] = reach
         self._grid.put(robot.id, reach.box)
 
-    def _meeting(self, robot: str, reach: Reach) -> list[str]:
-        near = [other for other in self._grid.meeting(reach.box) if other != robot]
-        vague = near if reach.endless else [other for other in near if self._reaches[other].endless]
+    def _step_back(self, robot: str) -> None:
+        """A robot is where its keyframe was taken."""
+        if self._standing.pop(robot, None) is not None:
+            self._ground.remove(robot)
+
+    def _around(self, robot: str) -> list[str]:
+        """Whom a robot may meet only if one of the two, or both, are looked at where they stand by now."""
+        reach, there = self._reaches[robot], self._standing.get(robot)
+        found = self._meeting(robot, reach, standing=True)
+        if there is not None:
+            found += self._meeting(robot, there) + self._meeting(robot, there, standing=True)
+        return found
+
+    def _stand_together(self, pair: Pair) -> bool:
+        """Do two robots' views meet from where they stand by now?"""
+        sides = [[each[robot] for each in (self._reaches, self._standing) if robot in each] for robot in pair]
+        return any(one.frustum.may_meet(other.frustum) for one, other in product(*sides))
+
+    def _meeting(self, robot: str, reach: Reach, *, standing: bool = False) -> list[str]:
+        """Robots whose views may meet this one, by their keyframes or by where those stand that are far from there."""
+        grid, reaches = (self._ground, self._standing) if standing else (self._grid, self._reaches)
+        near = {other: reaches[other] for other in grid.meeting(reach.box) if other != robot}
+        vague = near if reach.endless else {other: its for other, its in near.items() if its.endless}
         if len(vague) <= _CROWD:
-            return self._met(reach, near)
+            return _met(reach, near)
         partners = self._agenda.partners(robot)
-        known = self._met(
-            reach, [other for other in near if other in partners or not (reach.endless or self._reaches[other].endless)]
+        known = _met(
+            reach,
+            {other: its for other, its in near.items() if other in partners or not (reach.endless or its.endless)},
         )
-        nearest = self._by_distance(reach, [other for other in vague if other not in partners])
+        nearest = _nearest(reach, {other: its for other, its in vague.items() if other not in partners}, 4 * _CROWD)
         # A view is endless to one side: among so many of the nearest there are as a rule enough.
-        return known + self._met(reach, nearest[: 4 * _CROWD])[: max(0, _CROWD - len(known))]
-
-    def _met(self, reach: Reach, near: Sequence[str]) -> list[str]:
-        """Who of those near it a view may meet, by the faces of the frusta."""
-        if not near:
-            return []
-        meet = Frusta([self._reaches[other].frustum for other in near]).may_meet(reach.frustum)
-        return [other for other, met in zip(near, meet.tolist(), strict=True) if met]
-
-    def _by_distance(self, reach: Reach, others: Sequence[str]) -> list[str]:
-        centres_m = np.array([self._reaches[other].keyframe.pose.centre_m for other in others]).reshape(-1, 3)
-        order = np.linalg.norm(centres_m - reach.keyframe.pose.centre_m, axis=1).argsort(kind="stable")
-        return [others[k] for k in order.tolist()]
+        return known + _met(reach, nearest)[: max(0, _CROWD - len(known))]
 
     def _judge(self, robot: Robot, keyframe: Keyframe, now_ns: int) -> None:
         name, former = robot.id, self._judged.get(robot.id)
         partners = dict.fromkeys(self._meeting(name, self._reaches[name]))
+        around = dict.fromkeys(self._around(name))
         for other in self._pairs.beside(name):
             if other not in partners:
                 pair = pair_of(name, other)
                 if self._worth_another_look(pair):
                     partners[other] = None
+                elif other in around:
+                    # Their keyframes show nothing in common, so that no survey would help.
+                    self._agenda.judge(pair, plausible=False)
                 else:
                     self._part(pair)
+        for other in around:
+            self._keep(pair_of(name, other), self._apart(name, other))
         for other in partners:
             self._meet(pair_of(name, other), self._apart(name, other))
         if former is None or former.keyframe is not keyframe:
@@ -224,8 +252,11 @@ class Neighbourhoods:
         return apart(first, second)
 
     def _meet(self, pair: Pair, answer: Answer | None) -> None:
-        self._pairs.meet(pair, answer)
+        self._keep(pair, answer)
         self._agenda.judge(pair, plausible=True)
+
+    def _keep(self, pair: Pair, answer: Answer | None) -> None:
+        self._pairs.meet(pair, answer)
         for robot, other in (pair, pair[::-1]):
             _discard(self._receding, robot, other)
 
@@ -242,7 +273,8 @@ class Neighbourhoods:
     def _recede(self, robot: str) -> None:
         """Another keyframe that shares nothing with those that it shared something with."""
         for other in list(self._receding.get(robot, ())):
-            held = self._groups.see(pair_of(robot, other), (0.0, 0.0))
+            pair = pair_of(robot, other)
+            held = None if pair in self._pairs else self._groups.see(pair, (0.0, 0.0))
             if held is None or held <= _NEGLIGIBLE:
                 _discard(self._receding, robot, other)
                 _discard(self._receding, other, robot)
@@ -273,6 +305,22 @@ class Neighbourhoods:
         if record.outcome in (NOT_SURVEYED, FAILED) and not record.verified:
             return record.measured and sum(self._pairs.overlaps(pair) or ()) > 0
         return record.verified
+
+
+def _met(reach: Reach, near: Mapping[str, Reach]) -> list[str]:
+    """Who of those near it a view may meet, by the faces of the frusta."""
+    if not near:
+        return []
+    meet = Frusta([its.frustum for its in near.values()]).may_meet(reach.frustum)
+    return [other for other, met in zip(near, meet.tolist(), strict=True) if met]
+
+
+def _nearest(reach: Reach, others: Mapping[str, Reach], count: int) -> dict[str, Reach]:
+    """So many of others at most, the nearest first."""
+    names = list(others)
+    centres_m = np.array([its.keyframe.pose.centre_m for its in others.values()]).reshape(-1, 3)
+    order = np.linalg.norm(centres_m - reach.keyframe.pose.centre_m, axis=1).argsort(kind="stable")
+    return {names[k]: others[names[k]] for k in order[:count].tolist()}
 
 
 def _discard(places: dict[str, dict[str, None]], robot: str, other: str) -> None:

@@ -157,12 +157,16 @@ def test_a_forgotten_robot_leaves_nothing_behind() -> None:
     scene = two_sides(retry_after_s=0.0)
     scene.send("b0", pose(0, AHEAD))
     scene.settle(lambda job: NOTHING)
+    scene.send_pose("b1", pose(0, AHEAD))
+    scene.tick()
+    assert scene.station._surveys.neighbourhoods._standing
     scene.wait(700)
     station = scene.station
     hoods, agenda = station._surveys.neighbourhoods, station._surveys._agenda
     assert list(scene.snapshot.robots) == []
     assert [hoods._reaches, hoods._judged, hoods._ageing, hoods._lapsed, hoods._receding, hoods._to_judge] == 6 * [{}]
     assert hoods._later == {}
+    assert (hoods._standing, len(hoods._ground)) == ({}, 0)
     assert (len(hoods._grid), hoods._horizon._far_m) == (0, {})
     assert (agenda._partners, agenda._fresh, agenda._moved, len(agenda._regular)) == ({}, {}, {}, 0)
     assert (agenda._patrol._slot, agenda._patrol._names, agenda._parked) == ({}, [], set())
@@ -230,6 +234,7 @@ def test_who_may_be_met_from_another_pose_can_be_asked() -> None:
     scene = two_sides()
     hoods = scene.station._surveys.neighbourhoods
     assert sorted(hoods.beside("a0", pose(0, AHEAD))) == ["a1", "a2"]
+    assert hoods.beside("a0", None) == []
     assert sorted(hoods.beside("a0", pose(0, BACK))) == ["b0", "b1", "b2"]
     assert hoods.beside("nobody", pose(0)) == []
 
