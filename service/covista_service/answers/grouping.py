@@ -31,7 +31,7 @@ def groups_report(snapshot: Snapshot) -> reports.GroupsReport:
     view = snapshot.groups
     return reports.GroupsReport(
         revision=view.revision,
-        time=reports.time_of(view.time_ns or snapshot.now_ns),
+        time=reports.time_of(view.time_ns or snapshot.wall_ns),
         groups=[reports.Group(label=group.label, robots=list(group.robots)) for group in view.groups],
         ungrouped=[reports.Ungrouped(robot=robot, reason=reason) for robot, reason in view.ungrouped],
         criterion="components" if view.settings.grouping == "components" else view.settings.criterion,

@@ -104,11 +104,11 @@ def evaluating(count: int) -> Call:
     for j in range(count):
         for i in range(j):
             held.see((robots[i], robots[j]), (overlap[i][j], overlap[j][i]))
-    held.evaluate((), 0, at_once=True)
+    held.evaluate((), 0, 0, at_once=True)
     places = cycle(zip(robots, swarm.position_m, strict=True))
 
     def evaluate() -> None:
         held.place(*next(places))
-        held.evaluate((), 0, at_once=True)
+        held.evaluate((), 0, 0, at_once=True)
 
     return evaluate

@@ -122,10 +122,10 @@ class Groups:
     def _spaced_ns(self, least_ns: int) -> int:
         return max(least_ns, _APART_PER_ROBOT_NS * len(self._affinity)) if least_ns else 0
 
-    def evaluate(self, ungrouped: Ungrouped, now_ns: int, *, at_once: bool) -> list[Effect]:
+    def evaluate(self, ungrouped: Ungrouped, now_ns: int, wall_ns: int, *, at_once: bool) -> list[Effect]:
         """Bring similarity and groups up to date if there is news; a new revision only if someone stands elsewhere.
 
-        `at_once` does not let drift wait.
+        `at_once` does not let drift wait. A new revision is of `wall_ns`, the time that others know.
         """
         # A clock that was set back must not make drift wait until it is where it was.
         recent = 0 <= now_ns - self._evaluated_ns < self._spaced_ns(self._regroup_after_ns)
@@ -146,7 +146,7 @@ class Groups:
             return effects
         groups = tuple(GroupView(label, tuple(sorted(robots))) for label, robots in members.items())
         revision = self.view.revision + 1
-        self.view = replace(self.view, revision=revision, time_ns=now_ns, groups=groups, ungrouped=ungrouped)
+        self.view = replace(self.view, revision=revision, time_ns=wall_ns, groups=groups, ungrouped=ungrouped)
         return effects + self._tell(members, now_ns)
 
     def _pending_is_due(self, now_ns: int) -> bool:

@@ -35,13 +35,14 @@ class Robot:
     """One robot, as far as the station has heard of it.
 
     `announced` names the newest keyframe that came, usable or not; `arrived` is the newest usable one, `keyframe` the
-    newest with features, which is in use.
+    newest with features, which is in use. `last_seen_ns` is wall time.
     """
 
     id: str
     status: Status | None = None
     tokens: set[str] = field(default_factory=set)
     sign_of_life_ns: int = 0
+    heard_ns: int = 0
     last_seen_ns: int | None = None
     clock_offset_ns: int | None = None
     boot: str | None = None
@@ -96,12 +97,13 @@ class Robot:
             if newest is None or newest.boot != boot or newest.sequence < sequence:
                 self.announced = KeyframeId(self.id, boot, sequence)
 
-    def heard(self, arrived_ns: int, time_ns: int | None = None) -> None:
-        """Note a message: presence by its arrival, the offset of the robot's clock by its sensor time."""
-        self.last_seen_ns = max(arrived_ns, self.last_seen_ns or 0)
+    def heard(self, arrived_ns: int, time_ns: int | None, wall_ns: int) -> None:
+        """Note a message: presence by its arrival, the offset of the robot's clock by sensor time and wall time."""
+        if arrived_ns >= self.heard_ns:
+            self.heard_ns, self.last_seen_ns = arrived_ns, wall_ns
         self.sign_of_life_ns = max(arrived_ns, self.sign_of_life_ns)
         if time_ns is not None:
-            self.clock_offset_ns = time_ns - arrived_ns
+            self.clock_offset_ns = time_ns - wall_ns
 
 
 class Roster:

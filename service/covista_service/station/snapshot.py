@@ -136,7 +136,7 @@ class GroupsView:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
-    """The station as of `now_ns`: ages and decay follow from the moment it was taken.
+    """The station as of `now_ns` in its own time: ages and decay follow from that; clocks show `wall_ns`.
 
     There are records of the pairs whose views may meet. All others that have been judged share nothing.
     """
@@ -149,6 +149,7 @@ class Snapshot:
     decay_after_ns: int
     unknown_after_ns: int
     workload: Workload = field(default_factory=Workload)
+    wall_ns: int = 0
 
     def group_of(self, robot: str) -> GroupView | None:
         """The group that a robot stands in."""

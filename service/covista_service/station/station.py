@@ -38,6 +38,7 @@ from covista_service.station.roster import Robot, Roster
 from covista_service.station.snapshot import RobotView, Snapshot
 from covista_service.station.successors import Successors
 from covista_service.station.surveys import Surveys
+from covista_service.station.timeline import Timeline
 from covista_service.station.workload import Workload
 
 # A clock further off than this is worth a look.
@@ -57,6 +58,7 @@ class Station:
         """`read` tells the overlaps of pairs of prospects."""
         self.options = options or StationOptions()
         self._unknown_after_ns = nanoseconds(self.options.unknown_after_s)
+        self._timeline = Timeline()
         self._roster = Roster(self.options)
         self._pairs = Pairs(self._unknown_after_ns)
         self._groups = Groups(self.options)
@@ -73,27 +75,11 @@ class Station:
         self._snapshot: Snapshot | None = None
 
     def receive(self, event: Event, now_ns: int) -> list[Effect]:
-        """Take in one event that happened at `now_ns` and say what is to be done."""
+        """Take in one event that happened at `now_ns`, even if that is set back, and say what is to be done."""
         if not isinstance(event, Tick):
             self._snapshot = None
-        match event:
-            case MessagesReceived():
-                self._messages_received(event)
-            case MessageDropped():
-                self._message_dropped(event)
-            case KeyframeArrived(keyframe):
-                return self._keyframe_arrived(keyframe)
-            case PoseArrived():
-                self._pose_arrived(event)
-            case TokenSeen() | TokenLost():
-                self._token(event, now_ns)
-            case FeaturesExtracted():
-                return self._features_extracted(event)
-            case SurveyDone() | SurfacesBuilt():
-                return self._take(event, now_ns)
-            case Tick():
-                return self._tick(now_ns)
-        return []
+        station_ns = self._timeline.at(now_ns)
+        return self._timeline.told(self._receive(self._timeline.heard(event), station_ns))
 
     @property
     def waits(self) -> bool:
@@ -119,6 +105,7 @@ class Station:
 
     def snapshot(self, now_ns: int) -> Snapshot:
         """All that is known, for ages as of `now_ns`; cheap while nothing changes."""
+        wall_ns, now_ns = now_ns, self._timeline.peek(now_ns)
         if self._snapshot is None:
             for robot in self._roster:
                 if robot.id not in self._views:
@@ -132,8 +119,9 @@ class Station:
                 nanoseconds(self.options.decay_after_s),
                 self._unknown_after_ns,
                 self._workload(),
+                wall_ns,
             )
-        return replace(self._snapshot, now_ns=now_ns)
+        return replace(self._snapshot, now_ns=now_ns, wall_ns=wall_ns)
 
     def census(self) -> Census:
         """The station in numbers, as of the last Tick where time matters."""
@@ -151,6 +139,26 @@ class Station:
             workload=self._workload(),
         )
 
+    def _receive(self, event: Event, now_ns: int) -> list[Effect]:
+        match event:
+            case MessagesReceived():
+                self._messages_received(event)
+            case MessageDropped():
+                self._message_dropped(event)
+            case KeyframeArrived(keyframe):
+                return self._keyframe_arrived(keyframe)
+            case PoseArrived():
+                self._pose_arrived(event)
+            case TokenSeen() | TokenLost():
+                self._token(event, now_ns)
+            case FeaturesExtracted():
+                return self._features_extracted(event)
+            case SurveyDone() | SurfacesBuilt():
+                return self._take(event, now_ns)
+            case Tick():
+                return self._tick(now_ns)
+        return []
+
     def _workload(self) -> Workload:
         """What waits and what was done."""
         return self._surveys.workload()
@@ -164,20 +172,23 @@ class Station:
 
     def _messages_received(self, event: MessagesReceived) -> None:
         robot = self._touch(event.robot)
-        robot.heard(event.arrived_ns)
+        self._hear(robot, event.arrived_ns)
         robot.ledgers[event.topic].hear(event.sequences, event.kept)
         if event.topic == "keyframe":
             robot.announce(event.sequences)
 
     def _message_dropped(self, event: MessageDropped) -> None:
         robot = self._touch(event.robot)
-        robot.heard(event.arrived_ns)
+        self._hear(robot, event.arrived_ns)
         robot.last_problem = event.text
         robot.ledgers[event.topic].drop(event.code, event.count, counted=event.counted)
 
+    def _hear(self, robot: Robot, arrived_ns: int, time_ns: int | None = None) -> None:
+        robot.heard(arrived_ns, time_ns, self._timeline.wall_ns(arrived_ns))
+
     def _keyframe_arrived(self, keyframe: Keyframe) -> list[Effect]:
         robot = self._touch(keyframe.id.robot)
-        robot.heard(keyframe.arrived_ns, keyframe.time_ns)
+        self._hear(robot, keyframe.arrived_ns, keyframe.time_ns)
         ledger, message = robot.ledgers["keyframe"], (keyframe.id.boot, keyframe.id.sequence)
         if not ledger.take(message):
             return []
@@ -209,7 +220,7 @@ class Station:
 
     def _pose_arrived(self, event: PoseArrived) -> None:
         robot = self._touch(event.robot)
-        robot.heard(event.arrived_ns, event.time_ns)
+        self._hear(robot, event.arrived_ns, event.time_ns)
         ledger, message = robot.ledgers["pose"], (event.boot, event.sequence)
         if not ledger.take(message):
             return
@@ -314,7 +325,8 @@ class Station:
     def _regroup(self, now_ns: int) -> list[Effect]:
         before = self._groups.view, self._groups.similarity
         seen = self._surveys.seen() if self._groups.may_evaluate(now_ns) else ()
-        effects = self._groups.evaluate(self._ungrouped(), now_ns, at_once=bool(seen))
+        wall_ns = self._timeline.wall_ns(now_ns)
+        effects = self._groups.evaluate(self._ungrouped(), now_ns, wall_ns, at_once=bool(seen))
         if (self._groups.view, self._groups.similarity) != before:
             self._snapshot = None
         for effect in effects:

@@ -92,6 +92,7 @@ def test_poses_regroup_a_few_times_a_second_and_a_new_keyframe_within_20_ms() ->
     assert scene.snapshot.similarity.revision == revision + 3
     scene.send_pose("a1", pose(0.1))
     scene.wait(-3600)
+    scene.wait(0.1)
     assert scene.snapshot.similarity.revision == revision + 4
 
 
