@@ -30,6 +30,7 @@ from covista_service.station.events import (
     GroupsChanged,
     GroupsEvaluated,
     Happened,
+    InterruptedTickError,
     Keyframe,
     KeyframeArrived,
     MessageDropped,
@@ -195,9 +196,10 @@ class Loop:
     def turn(self) -> bool:
         """Take in one batch and act on it; True if there is more to take in."""
         began_ns, self._next_ns = self._clock(), None
+        # Before anything is taken in: a crew that cannot tell must not cost a batch.
+        self._resize()
         events, self._next_ns = self._source.drain(BATCH, began_ns)
         effects: list[Effect] = []
-        self._resize()
         results = [self._results.popleft() for _ in range(len(self._results))]
         for event in itertools.chain(results, events, (Tick(),)):
             effects += self._receive(event)
@@ -260,13 +262,13 @@ class Loop:
         try:
             with self._telemetry.timed(stage) if stage else _UNTIMED:
                 effects = self._station.receive(event, self._clock())
-        except Exception:
+        except Exception as failure:
             # A bug that one robot's message brings to light must not silence the swarm.
             self._telemetry.fault("station")
             log.exception(
                 "the station failed; going on", extra=about(event=type(event).__name__, robot=_robot_of(event))
             )
-            return ()
+            effects = failure.effects if isinstance(failure, InterruptedTickError) else []
         for effect in effects:
             note_effect(effect)
             self._act(effect)

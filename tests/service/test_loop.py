@@ -211,6 +211,50 @@ def test_a_bug_that_one_event_brings_to_light_does_not_stop_the_others(
     assert {record.fields["robot"] for record in caplog.records} == {"r1"}
 
 
+@pytest.mark.parametrize(
+    ("where", "what"), [("_groups", "evaluate"), ("_successors", "due"), ("_pairs", "expire"), ("_roster", "lapsed")]
+)
+def test_a_part_of_a_tick_that_fails_keeps_no_job_from_the_workers(
+    where: str, what: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    desk = Desk()
+
+    def broken(*arguments: object, **options: object) -> None:
+        raise ZeroDivisionError
+
+    with monkeypatch.context() as bug:
+        bug.setattr(getattr(desk.station, where), what, broken)
+        desk.put(picture_bytes("r1"), "r1")
+        desk.settle()
+        assert sample(desk, "covista_job_seconds_count", kind="extract") == 1
+        desk.wait()
+        desk.put(keyframe_bytes("r1", 0.0, sequence=1), "r1", 1)
+        desk.put(keyframe_bytes("r2", 1.0), "r2")
+        desk.settle()
+        assert desk.telemetry.summary().outcomes == {"measured": 1}
+        assert desk.loop.snapshot().pair("r1", "r2").found_by is FoundBy.IMAGE
+        assert desk.telemetry.summary().under_way == 0
+    desk.wait()
+    desk.settle()
+    assert [len(group.robots) for group in desk.loop.snapshot().groups.groups] == [2]
+    assert (sample(desk, "covista_faults_total", where="station") or 0) >= 3
+
+
+def test_a_crew_that_cannot_say_how_it_is_costs_no_message(monkeypatch: pytest.MonkeyPatch) -> None:
+    desk = Desk()
+    desk.put(keyframe_bytes("r1", 0.0), "r1")
+
+    def broken() -> None:
+        raise ConnectionError
+
+    with monkeypatch.context() as bug:
+        bug.setattr(desk.hands, "status", broken)
+        with pytest.raises(ConnectionError):
+            desk.loop.turn()
+    desk.settle()
+    assert desk.loop.snapshot().robots["r1"].keyframes.used == 1
+
+
 def test_a_crowd_is_taken_in_by_batches() -> None:
     desk = Desk()
     for number in range(100):

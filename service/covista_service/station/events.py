@@ -226,3 +226,11 @@ class Happened:
 
 
 Effect = ExtractFeatures | SurveyPair | BuildSurfaces | GroupsEvaluated | GroupsChanged | Happened
+
+
+class InterruptedTickError(Exception):
+    """A part of a Tick has failed; the `effects` of the others are to be carried out all the same."""
+
+    def __init__(self, effects: list[Effect]) -> None:
+        super().__init__("a part of a tick failed")
+        self.effects = effects

@@ -21,7 +21,7 @@ from covista_service.station.ledger import Counts
 from covista_service.station.options import NS_PER_S, GroupingOptions
 from covista_service.station.outlook import Outlook, Ratios
 from covista_service.station.pairs import Answer, Judged, PairRecord, apart, pair_of
-from covista_service.station.roster import Fix
+from covista_service.station.roster import Fix, Robot
 from covista_service.station.workload import Workload
 
 Reason = Literal["no_pose", "gone"]
@@ -50,6 +50,28 @@ class RobotView:
     poses: Counts
     last_problem: str | None
     judged: Judged | None = None
+
+    @classmethod
+    def of(cls, robot: Robot, group: str | None, correction: Correction | None, judged: Judged | None) -> RobotView:
+        """A robot as it is now, in this group."""
+        offset_ns = robot.clock_offset_ns
+        return cls(
+            id=robot.id,
+            status=robot.status or Status.LIVE,
+            group=group,
+            boot=robot.boot,
+            camera=None if robot.arrived is None else robot.arrived.camera,
+            fix=robot.fix,
+            keyframe=None if robot.keyframe is None else robot.keyframe.id,
+            announced=robot.announced,
+            last_seen_ns=robot.last_seen_ns,
+            clock_offset_s=None if offset_ns is None else offset_ns / NS_PER_S,
+            correction=correction,
+            keyframes=robot.ledgers["keyframe"].counts(),
+            poses=robot.ledgers["pose"].counts(),
+            last_problem=robot.last_problem,
+            judged=judged,
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

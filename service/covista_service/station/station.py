@@ -18,6 +18,7 @@ from covista_service.station.events import (
     GroupsChanged,
     GroupsEvaluated,
     Happened,
+    InterruptedTickError,
     Keyframe,
     KeyframeArrived,
     MessageDropped,
@@ -39,7 +40,6 @@ from covista_service.station.snapshot import RobotView, Snapshot
 from covista_service.station.successors import Successors
 from covista_service.station.surveys import Surveys
 from covista_service.station.timeline import Timeline
-from covista_service.station.workload import Workload
 
 # A clock further off than this is worth a look.
 _CLOCK_OFF_NS = nanoseconds(10)
@@ -118,7 +118,7 @@ class Station:
                 self._pairs.records(),
                 nanoseconds(self.options.decay_after_s),
                 self._unknown_after_ns,
-                self._workload(),
+                self._surveys.workload(),
                 wall_ns,
             )
         return replace(self._snapshot, now_ns=now_ns, wall_ns=wall_ns)
@@ -136,7 +136,7 @@ class Station:
             matrix_revision=self._groups.similarity.revision,
             keyframes=sum(robot.keyframe is not None for robot in robots),
             pairs=len(self._pairs),
-            workload=self._workload(),
+            workload=self._surveys.workload(),
         )
 
     def _receive(self, event: Event, now_ns: int) -> list[Effect]:
@@ -158,10 +158,6 @@ class Station:
             case Tick():
                 return self._tick(now_ns)
         return []
-
-    def _workload(self) -> Workload:
-        """What waits and what was done."""
-        return self._surveys.workload()
 
     def _token(self, event: TokenSeen | TokenLost, now_ns: int) -> None:
         if isinstance(event, TokenSeen):
@@ -275,31 +271,51 @@ class Station:
             self._surveys.neighbourhoods.place(robot.id)
 
     def _tick(self, now_ns: int) -> list[Effect]:
-        effects: list[Effect] = [*self._presence(now_ns)]
+        """Every part of it, whatever becomes of the others: what is under way must get to the workers."""
+        effects: list[Effect] = []
+        failures: list[Exception] = []
+        start, extract = self._surveys.start, lambda _: self._extract()
+        for part in (self._presence, self._expire, self._judge, extract, start, self._look, self._regroup):
+            try:
+                effects += part(now_ns)
+            except Exception as error:  # noqa: BLE001 - raised below
+                failures.append(error)
+        if effects or failures:
+            self._snapshot = None
+        if failures:
+            raise InterruptedTickError(self._timeline.told(effects)) from failures[0]
+        return effects
+
+    def _expire(self, now_ns: int) -> list[Effect]:
         expired = self._pairs.expire(now_ns)
         for pair in expired:
             self._groups.see(pair, None)
-        lapsed = self._surveys.neighbourhoods.expire(now_ns)
+        if self._surveys.neighbourhoods.expire(now_ns) or expired:
+            self._snapshot = None
+        return []
+
+    def _judge(self, now_ns: int) -> list[Effect]:
         for keyframe in self._successors.due(self._surveys.busy, now_ns):
             self._use(self._touch(keyframe.id.robot), keyframe)
         judged = self._surveys.judge(now_ns)
         for robot in judged:
             self._views.pop(robot, None)
-        effects += self._extract()
-        effects += self._surveys.start(now_ns)
-        looked = self._surveys.forecasts.look(now_ns)
-        effects += self._regroup(now_ns)
-        if effects or expired or lapsed or judged or looked:
+        if judged:
             self._snapshot = None
-        return effects
+        return []
 
-    def _presence(self, now_ns: int) -> list[Happened]:
+    def _look(self, now_ns: int) -> list[Effect]:
+        if self._surveys.forecasts.look(now_ns):
+            self._snapshot = None
+        return []
+
+    def _presence(self, now_ns: int) -> list[Effect]:
         """Look at those who were heard of, and at everybody some times a second."""
         heard, self._heard = self._heard, {}
         everybody = self._looked_ns is None or not 0 <= now_ns - self._looked_ns < _LOOK_NS
         if everybody:
             self._looked_ns = now_ns
-        happened: list[Happened] = []
+        happened: list[Effect] = []
         for name in list(self._names()) if everybody else sorted(heard):
             robot = self._roster.get(name)
             if robot is not None:
@@ -371,24 +387,8 @@ class Station:
         return self._roster.meet(robot)
 
     def _view(self, robot: Robot) -> RobotView:
-        offset_ns = robot.clock_offset_ns
-        return RobotView(
-            id=robot.id,
-            status=robot.status or Status.LIVE,
-            group=self._groups.label_of(robot.id),
-            boot=robot.boot,
-            camera=None if robot.arrived is None else robot.arrived.camera,
-            fix=robot.fix,
-            keyframe=None if robot.keyframe is None else robot.keyframe.id,
-            announced=robot.announced,
-            last_seen_ns=robot.last_seen_ns,
-            clock_offset_s=None if offset_ns is None else offset_ns / NS_PER_S,
-            correction=self._surveys.correction(robot.id),
-            keyframes=robot.ledgers["keyframe"].counts(),
-            poses=robot.ledgers["pose"].counts(),
-            last_problem=robot.last_problem,
-            judged=self._surveys.neighbourhoods[robot.id],
-        )
+        correction, judged = self._surveys.correction(robot.id), self._surveys.neighbourhoods[robot.id]
+        return RobotView.of(robot, self._groups.label_of(robot.id), correction, judged)
 
 
 def _older(keyframe: Keyframe, held: Keyframe | None) -> bool:
