@@ -42,6 +42,8 @@ class Agenda:
         self._boundary = boundary
         self.capacity = options.capacity
         self._in_flight: dict[Pair, tuple[Keyframe, Keyframe]] = {}
+        # Surveys whose robots are forgotten: workers have their hands full of them all the same.
+        self._abandoned: Counter[tuple[KeyframeId, KeyframeId]] = Counter()
         self._partners: dict[str, dict[str, Plan]] = {}
         self._fresh: dict[str, None] = {}
         # Fresh ones whose pairs are all under way, or who have none: they wait for that to change.
@@ -82,17 +84,18 @@ class Agenda:
     @property
     def under_way_count(self) -> int:
         """How many surveys are under way."""
-        return len(self._in_flight)
+        return len(self._in_flight) + self._abandoned.total()
 
     def workload(self) -> Workload:
         """What waits, and what was started."""
-        waiting = {"fresh": len(self._fresh) + len(self._parked), "regular": len(self._regular)}
+        parked = sum(robot in self._partners for robot in self._parked)
+        waiting = {"fresh": len(self._fresh) + parked, "regular": len(self._regular)}
         waiting["moved"] = len(self._moved)
-        return Workload(waiting, dict(self._started), len(self._in_flight), self._outdated)
+        return Workload(waiting, dict(self._started), self.under_way_count, self._outdated)
 
     def start(self, now_ns: int) -> tuple[Keyframe, Keyframe] | None:
         """The next pair of keyframes to survey, under way from now on; None if nothing is due or all hands are full."""
-        if len(self._in_flight) >= self.capacity:
+        if self.under_way_count >= self.capacity:
             return None
         for name in dict.fromkeys((_TURNS[self._started.total() % len(_TURNS)], *_QUEUES)):
             pair = self._next(name, now_ns)
@@ -105,6 +108,7 @@ class Agenda:
         pair = (first.robot, second.robot)
         keyframes = self._in_flight.get(pair)
         if keyframes is None or (keyframes[0].id, keyframes[1].id) != (first, second):
+            self._abandoned -= Counter([(first, second)])
             return None
         return self._in_flight.pop(pair)
 
@@ -124,7 +128,7 @@ class Agenda:
         return any(name == keyframe.id for keyframes in self._in_flight.values() for keyframe in keyframes)
 
     def forget(self, robot: str) -> None:
-        """Take a robot off; what comes of its surveys under way is of no interest any more."""
+        """Take a robot off; its surveys under way are so until they are done, whatever comes of them."""
         for other in list(self.partners(robot)):
             self._part(pair_of(robot, other))
         self._fresh.pop(robot, None)
@@ -132,7 +136,8 @@ class Agenda:
         self._moved.pop(robot, None)
         self._patrol.forget(robot)
         for pair in [pair for pair in self._in_flight if robot in pair]:
-            del self._in_flight[pair]
+            first, second = self._in_flight.pop(pair)
+            self._abandoned[first.id, second.id] += 1
 
     def _part(self, pair: Pair) -> None:
         self._regular.drop(pair)

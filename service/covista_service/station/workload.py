@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 class Workload:
     """What waits now and what was done since the start; `waiting` pairs and `started` surveys are by queue.
 
-    `waiting` counts robots in the queues fresh and moved, and pairs in regular, where most fresh ones stand too.
+    `waiting` counts robots in the queues fresh (with partners) and moved, and pairs in regular, where most fresh ones
+    stand too.
     `outdated` surveys were given up before they began, since a keyframe of theirs had been replaced. `forecasts` are
     ordered pairs whose overlap was read anew for a new pose, `forecasts_waiting` robots whose new pose waits for that.
     """

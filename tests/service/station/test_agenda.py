@@ -4,7 +4,9 @@ from collections import Counter
 from itertools import combinations
 from random import Random
 
+import numpy as np
 import pytest
+from covista_service.perception.camera import Pose
 from covista_service.station.events import BuildSurfaces, ExtractFeatures, SurveyPair, Tick
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -341,3 +343,32 @@ def test_pairs_at_the_boundary_of_groups_are_surveyed_before_others() -> None:
     assert boundary(("a1", "b1")) > max(boundary(("a1", "a2")), boundary(("a1", "c1")), boundary(("c1", "c2")))
     assert all(0 <= boundary(pair) <= 1 for pair in combinations(sorted(places), 2))
     assert boundary(("a1", "nobody")) == 0.0
+
+
+def test_the_hands_of_a_robot_that_is_forgotten_are_full_until_they_are_back() -> None:
+    scene = Scene.of(capacity=2, forget_after_s=1.0, live_after_s=0.5, gone_after_s=0.1)
+    under_way: list[SurveyPair] = []
+    for turn in range(30):
+        # All are forgotten before any survey is done; one comes back of a worker now and then, or has failed.
+        for robot in ("r1", "r2", "r3"):
+            scene.send(robot, sequence=turn)
+        under_way += jobs(scene.tick())
+        assert len(under_way) == scene.snapshot.workload.under_way <= 2
+        under_way += jobs(scene.wait(1.5))
+        assert scene.snapshot.robots == {}
+        assert len(under_way) == scene.snapshot.workload.under_way == 2
+        if turn % 3 == 2:
+            scene.done(under_way.pop(0), measured() if turn % 2 else None)
+            assert scene.snapshot.workload.under_way == 1
+    assert sum(scene.snapshot.workload.started.values()) == 11
+
+
+def test_who_has_no_partners_waits_for_nothing() -> None:
+    scene = Scene.of(retry_after_s=1e6)
+    scene.send("r1", pose(0, AHEAD))
+    scene.send("r2", Pose(BACK, np.array([0.0, 0.0, -50.0])))
+    scene.settle(lambda job: NOTHING)
+    scene.send("r1", pose(0, AHEAD))
+    scene.settle(lambda job: NOTHING)
+    assert scene.station._surveys._agenda._parked == {"r1"}
+    assert scene.snapshot.workload.waiting == {"fresh": 0, "regular": 0, "moved": 0}

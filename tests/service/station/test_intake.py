@@ -250,3 +250,18 @@ def test_news_of_the_unknown_changes_nothing(event) -> None:
     assert scene.receive(event) == []
     assert scene.snapshot.robots == {}
     np.testing.assert_array_equal(scene.snapshot.similarity.similarity, np.zeros((0, 0)))
+
+
+def test_the_hands_of_a_robot_that_is_forgotten_are_full_until_they_are_back() -> None:
+    scene = Scene.of(capacity=2, forget_after_s=1.0, live_after_s=0.5, gone_after_s=0.1)
+    under_way: list[KeyframeId] = []
+    for turn in range(12):
+        for robot in ("r1", "r2", "r3"):
+            under_way += extractions(scene.send(robot, image=True, sequence=turn))
+        under_way += extractions(scene.wait(1.5))
+        assert scene.snapshot.robots == {}
+        assert len(under_way) == 2
+        if turn % 3 == 2:
+            keyframe = under_way.pop(0)
+            scene.receive(FeaturesExtracted(keyframe, FEATURES if turn % 2 else None, code="bad_image"))
+    assert scene.station._extractions._abandoned.total() == 1
