@@ -34,7 +34,8 @@ class Agreements:
 
         Who contradicts that set is taken to be wrong; nobody is borne out where no set is larger than all others. A
         robot's witnesses are those that images connect it with, whatever they say, the nearest first. Only keyframes
-        that are still `held` bear witness: a robot that was right long ago may have lost its way.
+        that are still `held` bear witness: a robot that was right long ago may have lost its way. What others have said
+        is forgotten as it is come across.
         """
         asked, borne_out = dict.fromkeys(robots), set[str]()
         while asked:
@@ -46,16 +47,23 @@ class Agreements:
 
     def forget(self, robot: str) -> None:
         """Drop a robot."""
-        for other in self._said.pop(robot, ()):
-            self._said[other].pop(robot)
-            if not self._said[other]:
-                del self._said[other]
+        for other in list(self._said.get(robot, ())):
+            self._drop(robot, other)
+
+    def _drop(self, *robots: str) -> None:
+        for one, other in (robots, robots[::-1]):
+            del self._said[one][other]
+            if not self._said[one]:
+                del self._said[one]
 
     def _around(self, robot: str, held: Held) -> list[str]:
         found, ahead = {robot: None}, deque([robot])
         while ahead:
-            for other, (names, _) in self._said.get(ahead.popleft(), {}).items():
-                if other not in found and all(map(held, names)):
+            one = ahead.popleft()
+            for other, (names, _) in list(self._said.get(one, {}).items()):
+                if not all(map(held, names)):
+                    self._drop(one, other)
+                elif other not in found:
                     if len(found) == NEAREST:
                         return list(found)
                     found[other] = None

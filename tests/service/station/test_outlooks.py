@@ -168,3 +168,29 @@ def test_nothing_is_left_of_a_robot_that_is_forgotten() -> None:
     for robot in ("r1", "r0", "r2"):
         held.drop(robot)
     assert not any((held._outlooks, held._joins, held._joined, held._parts, *held._within.values()))
+
+
+def test_what_was_said_of_keyframes_that_are_replaced_is_forgotten() -> None:
+    """However robots mix, no more is kept than what is said of keyframes in use, and what nobody has asked about."""
+    found, rng = Agreements(), np.random.default_rng(1)
+    newest = dict.fromkeys(range(40), 0)
+
+    def held(name: KeyframeId) -> bool:
+        return newest[int(name.robot)] == name.sequence
+
+    kept = []
+    for turn in range(400):
+        one, *others = rng.choice(40, 4, replace=False).tolist()
+        newest[one] = turn
+        for other in others:
+            names = [KeyframeId(str(robot), "b0", newest[robot]) for robot in (one, other)]
+            found.note(*names, agree=bool(turn % 3))
+        found.borne_out([str(one)], held)
+        assert all(one in found._said[other] for one, said in found._said.items() for other in said)
+        kept.append(sum(map(len, found._said.values())) // 2)
+    # Each has the links of its last turn, and those that others have made with it since.
+    assert max(kept) < 40 * 6
+    for robot in newest:
+        newest[robot] = -1
+    found.borne_out([str(robot) for robot in newest], held)
+    assert found._said == {}
