@@ -17,7 +17,7 @@ from covista_service.perception.visibility import Seeing
 from covista_service.station.allowance import Allowance
 from covista_service.station.events import Keyframe, Pair
 from covista_service.station.groups import Groups
-from covista_service.station.options import StationOptions
+from covista_service.station.options import StationOptions, nanoseconds
 from covista_service.station.outlook import Outlook, Prospect, Ratios, depths_m, stands
 from covista_service.station.outlooks import Outlooks
 from covista_service.station.pairs import Answer, Pairs, pair_of
@@ -67,6 +67,7 @@ class Forecasts:
         self._meeting = meeting
         self._overlaps_of = read
         self._allowance = Allowance(options.forecasts_per_s)
+        self._unknown_after_ns = nanoseconds(options.unknown_after_s)
         self._allowed = options.forecasts_per_s > 0
         self._prospects: dict[str, Prospect] = {}
         # Robots that have told a pose or a keyframe, and those of them that have moved, in order.
@@ -88,7 +89,7 @@ class Forecasts:
         """Surfaces of these robots are new: all overlaps that they have part in are read at once."""
         for robot in robots:
             self._waiting.pop(robot, None)
-        self._read({robot: self._beside(robot) for robot in robots}, robots, now_ns)
+        self._read({robot: self._beside(robot) for robot in robots}, robots, now_ns, anew=True)
 
     def look(self, now_ns: int) -> bool:
         """Read the overlaps of robots that have moved, as many as are allowed by now; False if there were none."""
@@ -100,7 +101,7 @@ class Forecasts:
         wanted, whole = self._next(min(self._allowance.at(now_ns), _AT_ONCE))
         if not wanted:
             return False
-        read = 2 * self._read(wanted, whole, None)
+        read = 2 * self._read(wanted, whole, now_ns)
         self._allowance.spend(read)
         self.count += read
         return True
@@ -148,8 +149,8 @@ class Forecasts:
             return None
         return known.fix.pose if _apart(known.keyframe.pose, known.fix.pose, source, _FAR) else None
 
-    def _read(self, wanted: dict[str, list[str]], whole: Sequence[str], now_ns: int | None) -> int:
-        """Read robots with their partners, and how many pairs that were; at `now_ns` from surfaces that are new.
+    def _read(self, wanted: dict[str, list[str]], whole: Sequence[str], now_ns: int, *, anew: bool = False) -> int:
+        """Read robots with their partners, and how many pairs that were; `anew` from surfaces that are new.
 
         `whole` are those that are read with all their partners.
         """
@@ -157,9 +158,7 @@ class Forecasts:
         pairs = [
             pair
             for pair in dict.fromkeys(pair_of(robot, other) for robot in wanted for other in wanted[robot])
-            if pair[0] in self._prospects
-            and pair[1] in self._prospects
-            and (now_ns is not None or not self._is_read(pair))
+            if pair[0] in self._prospects and pair[1] in self._prospects and (anew or not self._is_read(pair))
         ]
         place: dict[str, int] = {}
         for pair in pairs:
@@ -169,10 +168,12 @@ class Forecasts:
             [self._prospects[name] for name in place],
             np.array([(place[a], place[b]) for a, b in pairs], np.int64).reshape(-1, 2),
             [self._outlooks.scales.ratios(*pair) for pair in pairs],
-            [self._since_ns(pair) if now_ns is None else now_ns for pair in pairs],
+            [now_ns if anew else self._since_ns(pair) for pair in pairs],
         )
         for pair, answer in zip(pairs, answers, strict=True):
-            self._enter(pair, answer)
+            # What rests on surfaces that old is unknown.
+            if now_ns - answer.computed_ns < self._unknown_after_ns:
+                self._enter(pair, answer)
         return len(pairs)
 
     def _enter(self, pair: Pair, answer: Answer) -> None:

@@ -96,15 +96,16 @@ class Neighbourhoods:
         for name in list(islice(self._later, _AT_ONCE)):
             del self._later[name]
             self.note(name)
-        robots = [self._roster[robot] for robot in self._to_judge]
-        self._to_judge.clear()
-        judged = [(robot, robot.keyframe) for robot in robots if robot.keyframe is not None]
-        # All are where they are now before any is held against another.
-        for robot, keyframe in judged:
-            self._settle(robot, keyframe)
-        for robot, keyframe in judged:
-            self._judge(robot, keyframe, now_ns)
-        return [robot.id for robot in robots]
+        names = list(self._to_judge)
+        # All are where they are now before any is held against another. Whoever fails costs nobody else a turn.
+        for name in names:
+            self._settle(name)
+        for name in names:
+            del self._to_judge[name]
+            robot = self._roster[name]
+            if robot.keyframe is not None:
+                self._judge(robot, robot.keyframe, now_ns)
+        return names
 
     def take_up(self, pair: Pair) -> None:
         """A survey of a pair is in: what stood for those who share nothing stands until surfaces are built."""
@@ -112,6 +113,8 @@ class Neighbourhoods:
 
     def look_over(self, pair: Pair) -> None:
         """A survey that verifies a pair makes it worth reading; one that does not ends what was kept for that alone."""
+        if pair[0] not in self._reaches or pair[1] not in self._reaches:
+            return
         reaches = self._reaches[pair[0]], self._reaches[pair[1]]
         if reaches[0].frustum.may_meet(reaches[1].frustum) or self._worth_another_look(pair):
             self._meet(pair, None)
@@ -171,13 +174,18 @@ class Neighbourhoods:
         for other in self._receding.pop(robot, {}):
             _discard(self._receding, other, robot)
 
-    def _settle(self, robot: Robot, keyframe: Keyframe) -> None:
-        held = self._reaches.get(robot.id)
-        if held is not None and held.is_of(keyframe, robot.depth) and not held.endless:
+    def _settle(self, name: str) -> None:
+        robot, held = self._roster[name], self._reaches.get(name)
+        keyframe = robot.keyframe
+        if keyframe is None or (held is not None and held.is_of(keyframe, robot.depth) and not held.endless):
             return
-        reach = Reach.of(keyframe, robot.depth, self._horizon.farthest_m, self._corrections[robot.id])
-        self._reaches[robot.id] = reach
-        self._grid.put(robot.id, reach.box)
+        try:
+            reach = Reach.of(keyframe, robot.depth, self._horizon.farthest_m, self._corrections[name])
+        except Exception:
+            del self._to_judge[name]
+            raise
+        self._reaches[name] = reach
+        self._grid.put(name, reach.box)
 
     def _step_back(self, robot: str) -> None:
         """A robot is where its keyframe was taken."""

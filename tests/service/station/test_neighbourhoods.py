@@ -8,10 +8,11 @@ import pytest
 from covista_schemas.reports import FoundBy
 from covista_service.perception.camera import Pose
 from covista_service.perception.surface import flat
-from covista_service.station.events import SurveyPair
+from covista_service.station.events import InterruptedTickError, SurveyPair
 from covista_service.station.horizon import Horizon
 from covista_service.station.outlook import Outlook
 from covista_service.station.pairs import pair_of
+from covista_service.station.reach import Reach
 from covista_service.station.station import Station
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -339,3 +340,54 @@ def test_what_the_sweep_has_found_shares_nothing_as_before_until_surfaces_tell()
     assert after.keyframe_a is before.keyframe_a
     scene.tick()
     assert scene.snapshot.pair("a0", "b0").found_by is FoundBy.IMAGE
+
+
+def test_whoever_cannot_be_judged_costs_nobody_else_a_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = two_sides()
+    hoods = scene.station._surveys.neighbourhoods
+
+    def broken(keyframe, *known):
+        if keyframe.id.robot == "b0":
+            raise ZeroDivisionError
+        return of(keyframe, *known)
+
+    of = Reach.of
+    monkeypatch.setattr(Reach, "of", broken)
+    for name in ("a0", "b0", "c0", "c1"):
+        scene.send(name, pose(1, AHEAD))
+    with pytest.raises(InterruptedTickError):
+        scene.tick()
+    scene.settle(lambda job: NOTHING)
+    assert {"a0", "c0", "c1"} <= set(hoods._reaches)
+    assert hoods._to_judge == {}
+    assert "c1" in partners(scene.station, "c0")
+
+
+def test_what_a_survey_says_of_a_robot_that_could_not_be_judged_is_survived() -> None:
+    scene = two_sides()
+    hoods = scene.station._surveys.neighbourhoods
+    hoods._reaches.pop("b0")
+    hoods.look_over(("a0", "b0"))
+    assert ("a0", "b0") not in scene.snapshot.records
+
+
+def test_the_matrix_knows_what_the_answers_know() -> None:
+    scene = two_sides(forget_after_s=5000, gone_after_s=5000, retry_after_s=1e6)
+
+    def agree() -> None:
+        similarity, snapshot = scene.snapshot.similarity, scene.snapshot
+        for (i, a), (k, b) in combinations(enumerate(similarity.robots), 2):
+            view, shared = snapshot.pair(a, b), similarity.overlap[i, k]
+            assert view.overlap_a == (None if np.isnan(shared) else pytest.approx(shared)), (a, b)
+
+    agree()
+    scene.wait(700)
+    agree()
+    # Two that had lapsed may meet now, and two others have parted.
+    for name, at in (("b0", AHEAD), ("a1", BACK)):
+        scene.send(name, pose(int(name[1]), at))
+    scene.tick()
+    agree()
+    assert scene.snapshot.pair("a0", "b0").found_by is FoundBy.UNKNOWN
+    scene.wait(1)
+    agree()
