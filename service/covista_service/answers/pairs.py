@@ -25,22 +25,25 @@ _DECIMALS_PX = 2
 
 def pairs_report(snapshot: Snapshot, robot: str | None = None, min_overlap: float | None = None) -> reports.PairsReport:
     """All pairs, or those of one robot, or those where one sees at least this share of the other's image."""
-    return reports.PairsReport(pairs=list(pair_summaries(snapshot, robot, min_overlap)))
+    summaries = pair_summaries(snapshot, robot, min_overlap)
+    return reports.PairsReport(pairs=[summary for summary in summaries if summary is not None])
 
 
 def pair_summaries(
     snapshot: Snapshot, robot: str | None = None, min_overlap: float | None = None
-) -> Iterator[reports.PairSummary]:
-    """What `pairs_report` lists, one by one: of a thousand robots they are half a million. Raises NotKnownError."""
-    if robot is None:
-        views = snapshot.pairs()
-    else:
+) -> Iterator[reports.PairSummary | None]:
+    """What `pairs_report` lists, one by one: of a thousand robots they are half a million. Raises NotKnownError.
+
+    None for each pair that was looked at and is not listed.
+    """
+    least = min_overlap or 0.0
+    views = snapshot.recorded() if least > 0 else snapshot.pairs()
+    if robot is not None:
         find_robot(snapshot, robot)
         views = (snapshot.pair(robot, other) for other in snapshot.robots if other != robot)
-    least = min_overlap or 0.0
     for view in views:
-        if max(view.overlap_a or 0.0, view.overlap_b or 0.0) >= least:
-            yield reports.PairSummary.model_validate(_pair(view, "a"))
+        listed = max(view.overlap_a or 0.0, view.overlap_b or 0.0) >= least
+        yield reports.PairSummary.model_validate(_pair(view, "a")) if listed else None
 
 
 def find_pair(snapshot: Snapshot, a: str, b: str) -> PairView:

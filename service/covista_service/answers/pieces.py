@@ -36,10 +36,12 @@ def similarity_json(snapshot: Snapshot) -> Iterator[bytes]:
 def pairs_json(snapshot: Snapshot, min_overlap: float | None = None) -> Iterator[bytes]:
     """`pairs_report` of all robots as JSON."""
     yield b'{"pairs":['
-    for count, summary in enumerate(pair_summaries(snapshot, None, min_overlap)):
-        text = summary.model_dump_json().encode()
-        yield b"," + text if count else text
-        if count % _PAIRS_AT_A_TIME == 0:
+    comma = b""
+    for looked, summary in enumerate(pair_summaries(snapshot, None, min_overlap)):
+        if summary is not None:
+            yield comma + summary.model_dump_json().encode()
+            comma = b","
+        if looked % _PAIRS_AT_A_TIME == 0:
             time.sleep(0)
     yield b"]}"
 

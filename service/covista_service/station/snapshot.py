@@ -154,6 +154,10 @@ class GroupsView:
     settings: GroupingOptions
     note: str | None = None
     waiting: tuple[str, ...] = ()
+    by_label: Mapping[str, GroupView] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "by_label", {group.label: group for group in self.groups})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -175,7 +179,8 @@ class Snapshot:
 
     def group_of(self, robot: str) -> GroupView | None:
         """The group that a robot stands in."""
-        return next((group for group in self.groups.groups if robot in group.robots), None)
+        view = self.robots.get(robot)
+        return None if view is None or view.group is None else self.groups.by_label.get(view.group)
 
     def pair(self, a: str, b: str) -> PairView:
         """One pair of known robots in either order, seen from the smaller id; KeyError if a robot is not known."""
@@ -209,3 +214,7 @@ class Snapshot:
     def pairs(self) -> Iterator[PairView]:
         """Every unordered pair of known robots once."""
         return (self.pair(a, b) for a, b in combinations(sorted(self.robots), 2))
+
+    def recorded(self) -> Iterator[PairView]:
+        """Those of them that there is a record of: no other share anything."""
+        return (self.pair(a, b) for a, b in sorted(self.records))

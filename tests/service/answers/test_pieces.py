@@ -2,14 +2,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from covista_schemas.reports import SimilarityReport
+from covista_schemas.reports import PairsReport, SimilarityReport
 from covista_service import answers
 from covista_service.station.snapshot import SimilarityView, Snapshot
 from covista_service.station.station import Station
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.service.station.scenes import Scene
+from tests.service.station.scenes import BACK, NOTHING, Scene, measured, pose
 
 
 def swarm(robots: int, seed: int) -> Snapshot:
@@ -49,3 +49,42 @@ def test_pairs_in_pieces_are_those_of_the_report(robots: int, min_overlap: float
     scene.settle()
     text = b"".join(answers.pairs_json(scene.snapshot, min_overlap))
     assert text.decode() == answers.pairs_report(scene.snapshot, None, min_overlap).model_dump_json()
+
+
+def sides() -> Snapshot:
+    """Eight robots that look ahead, and as many that look back."""
+    scene = Scene()
+    for number in range(8):
+        scene.send(f"a{number}", pose(0.1 * number))
+        scene.send(f"b{number}", pose(0.1 * number, BACK))
+    scene.settle(lambda job: measured() if job.first.robot[0] == job.second.robot[0] else NOTHING)
+    return scene.snapshot
+
+
+@pytest.mark.parametrize(("min_overlap", "count"), [(None, 120), (0.0, 120), (0.01, 56), (0.6, 56), (0.61, 0)])
+def test_pairs_that_share_enough_are_those_of_all(min_overlap: float | None, count: int) -> None:
+    snapshot = sides()
+    report = PairsReport.model_validate_json(b"".join(answers.pairs_json(snapshot, min_overlap)))
+    every = answers.pairs_report(snapshot).pairs
+    assert report.pairs == [
+        pair for pair in every if max(pair.overlap_a or 0.0, pair.overlap_b or 0.0) >= (min_overlap or 0.0)
+    ]
+    assert len(report.pairs) == count
+
+
+def test_who_asks_for_pairs_that_share_something_has_no_others_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    snapshot, looked = sides(), []
+    look = Snapshot.pair
+    monkeypatch.setattr(Snapshot, "pair", lambda self, a, b: looked.append((a, b)) or look(self, a, b))
+    list(answers.pairs_json(snapshot, 0.3))
+    assert looked == sorted(snapshot.records)
+
+
+@pytest.mark.parametrize(("min_overlap", "pauses"), [(None, 6), (0.3, 3), (0.9, 3)])
+def test_it_pauses_for_the_pairs_that_were_looked_at(
+    min_overlap: float | None, pauses: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    snapshot, paused = sides(), []
+    monkeypatch.setattr("covista_service.answers.pieces.time.sleep", paused.append)
+    list(answers.pairs_json(snapshot, min_overlap))
+    assert paused == [0] * pauses

@@ -37,7 +37,9 @@ def test_robots_that_see_the_same_stand_together() -> None:
     assert sorted(groups(scene).values()) == [("a1", "a2", "a3"), ("b1", "b2", "b3")]
     view = scene.snapshot
     assert view.robots["a2"].group == view.robots["a1"].group != view.robots["b1"].group
-    assert view.group_of("b2") in view.groups.groups
+    assert view.group_of("nobody") is None
+    for robot in view.robots:
+        assert view.group_of(robot) == next(group for group in view.groups.groups if robot in group.robots)
     assert [m for m, _ in view.groups.scores] == [1, 2, 3, 4, 5, 6]
 
 
