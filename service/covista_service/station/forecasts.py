@@ -98,10 +98,10 @@ class Forecasts:
             if robot is not None and self._is_news(robot):
                 self._waiting.setdefault(name, _Turn())
         self._heard.clear()
-        wanted, whole = self._next(min(self._allowance.at(now_ns), _AT_ONCE))
+        wanted, begun = self._next(min(self._allowance.at(now_ns), _AT_ONCE))
         if not wanted:
             return False
-        read = 2 * self._read(wanted, whole, now_ns)
+        read = 2 * self._read(wanted, begun, now_ns)
         self._allowance.spend(read)
         self.count += read
         return True
@@ -113,29 +113,29 @@ class Forecasts:
         self._prospects.pop(robot, None)
 
     def _next(self, room: int) -> tuple[dict[str, list[str]], list[str]]:
-        """Who is to be read with whom now, the first in the row first, and those of them who are read as a whole.
+        """Who is to be read with whom now, the first in the row first, and those of them whose turn begins.
 
         The last one is perhaps not read with all of its partners: the others follow in the next turn.
         """
         wanted: dict[str, list[str]] = {}
-        whole: list[str] = []
+        begun: list[str] = []
         for robot in list(islice(self._waiting, max(room, 0))):
             if room <= 0:
                 break
             turn = self._waiting[robot]
             rest = self._beside(robot) if turn.rest is None else turn.rest
+            if turn.rest is None:
+                begun.append(robot)
             count = max(room // 2, 1)
             wanted[robot] = rest[:count]
             room -= 2 * len(wanted[robot])
             if len(rest) > count:
                 turn.rest = rest[count:]
                 break
-            if turn.rest is None:
-                whole.append(robot)
             del self._waiting[robot]
             if turn.again:
                 self._waiting[robot] = _Turn()
-        return wanted, whole
+        return wanted, begun
 
     def _beside(self, robot: str) -> list[str]:
         """All that something is known with, and, where a robot is far from its keyframe, all that its view may meet."""
@@ -149,12 +149,12 @@ class Forecasts:
             return None
         return known.fix.pose if _apart(known.keyframe.pose, known.fix.pose, source, _FAR) else None
 
-    def _read(self, wanted: dict[str, list[str]], whole: Sequence[str], now_ns: int, *, anew: bool = False) -> int:
+    def _read(self, wanted: dict[str, list[str]], begun: Sequence[str], now_ns: int, *, anew: bool = False) -> int:
         """Read robots with their partners, and how many pairs that were; `anew` from surfaces that are new.
 
-        `whole` are those that are read with all their partners.
+        `begun` are those whose turn begins: all their partners are read for where they stand now.
         """
-        self._bring_up_to_date(wanted, whole)
+        self._bring_up_to_date(wanted, begun)
         pairs = [
             pair
             for pair in dict.fromkeys(pair_of(robot, other) for robot in wanted for other in wanted[robot])
@@ -208,8 +208,8 @@ class Forecasts:
             return True
         return _apart(held.reported, robot.fix.pose, source)
 
-    def _bring_up_to_date(self, wanted: dict[str, list[str]], whole: Sequence[str]) -> None:
-        """Take where robots and partners stand now; who has moved, and is not read as a `whole`, is to wait."""
+    def _bring_up_to_date(self, wanted: dict[str, list[str]], begun: Sequence[str]) -> None:
+        """Take where robots and partners stand now; who has moved, and whose turn has not just `begun`, is to wait."""
         names = dict.fromkeys(name for robot in wanted for name in (robot, *wanted[robot]))
         robots = [self._roster.get(name) for name in names if name in wanted or self._may_have_moved(name)]
         seen = [_Seen(*known) for robot in robots if robot is not None and (known := self._known(robot)) is not None]
@@ -221,7 +221,7 @@ class Forecasts:
         there = dict(zip((one.robot for one in away), surfaces[len(heirs) :], strict=True))
         for one in seen:
             self._prospects[one.robot] = one.prospect(there.get(one.robot))
-            if one.robot not in whole and self._allowed:
+            if one.robot not in begun and self._allowed:
                 turn = self._waiting.setdefault(one.robot, _Turn())
                 turn.again = turn.rest is not None
 

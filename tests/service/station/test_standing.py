@@ -85,3 +85,23 @@ def test_where_no_forecasts_are_allowed_nobody_stands_anywhere_else() -> None:
     scene.send_pose("r1", pose(0, BACK))
     scene.tick()
     assert scene.station._surveys.neighbourhoods._standing == {}
+
+
+def test_a_robot_with_many_partners_has_one_turn_for_one_pose_and_another_for_the_next() -> None:
+    scene = robots(8, forecasts_per_s=40)
+    forecasts = scene.station._surveys.forecasts
+    scene.now_ns += S
+    scene.send_pose("r1", pose(0.5))
+    scene.tick()
+    # The allowance is for five partners of seven.
+    assert [len(turn.rest or ()) for turn in forecasts._waiting.values()] == [2]
+    scene.wait(0.2)
+    assert forecasts._waiting == {}
+    scene.wait(1)
+    scene.send_pose("r1", pose(1.0))
+    scene.tick()
+    scene.send_pose("r1", pose(1.5))
+    told_ns = scene.now_ns
+    while scene.station.waits:
+        scene.wait(0.2)
+    assert {pair(scene, "r1", f"r{k}").stands_for_ns[0] for k in range(2, 9)} == {told_ns}
