@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from itertools import islice, product
+from itertools import islice
 
 import numpy as np
 
@@ -36,8 +36,8 @@ class Neighbourhoods:
     Who is no partner shares nothing: of such a pair nothing is kept but when its two robots were judged, and a row of
     zeros in the groups. So a keyframe costs what its neighbours cost, whatever the size of the swarm.
 
-    Of those whom it may meet for no other reason than that a view is endless a robot takes the nearest 32; the others
-    are left to the sweep, until depths are known.
+    Of those whom it may meet for no other reason than that a view is endless a robot takes the nearest 32, each time it
+    is judged; the others are left to the sweep, until depths are known.
     """
 
     def __init__(
@@ -115,8 +115,9 @@ class Neighbourhoods:
         """A survey that verifies a pair makes it worth reading; one that does not ends what was kept for that alone."""
         if pair[0] not in self._reaches or pair[1] not in self._reaches:
             return
-        reaches = self._reaches[pair[0]], self._reaches[pair[1]]
-        if reaches[0].frustum.may_meet(reaches[1].frustum) or self._worth_another_look(pair):
+        one, other = self._reaches[pair[0]], self._reaches[pair[1]]
+        partners = pair[1] in self._agenda.partners(pair[0])
+        if (partners and one.frustum.may_meet(other.frustum)) or self._worth_another_look(pair):
             self._meet(pair, None)
         elif self._stand_together(pair):
             self._agenda.judge(pair, plausible=False)
@@ -201,9 +202,10 @@ class Neighbourhoods:
         return found
 
     def _stand_together(self, pair: Pair) -> bool:
-        """Do two robots' views meet from where they stand by now?"""
-        sides = [[each[robot] for each in (self._reaches, self._standing) if robot in each] for robot in pair]
-        return any(one.frustum.may_meet(other.frustum) for one, other in product(*sides))
+        """Do two robots' views meet from where one of them, or both, stand by now?"""
+        first, second = ((self._reaches[robot], self._standing.get(robot)) for robot in pair)
+        couples = ((first[1], second[0]), (first[0], second[1]), (first[1], second[1]))
+        return any(one and other and one.frustum.may_meet(other.frustum) for one, other in couples)
 
     def _meeting(self, robot: str, reach: Reach, *, standing: bool = False) -> list[str]:
         """Robots whose views may meet this one, by their keyframes or by where those stand that are far from there."""
@@ -212,14 +214,9 @@ class Neighbourhoods:
         vague = near if reach.endless else {other: its for other, its in near.items() if its.endless}
         if len(vague) <= _CROWD:
             return _met(reach, near)
-        partners = self._agenda.partners(robot)
-        known = _met(
-            reach,
-            {other: its for other, its in near.items() if other in partners or not (reach.endless or its.endless)},
-        )
-        nearest = _nearest(reach, {other: its for other, its in vague.items() if other not in partners}, 4 * _CROWD)
+        firm = {other: its for other, its in near.items() if other not in vague}
         # A view is endless to one side: among so many of the nearest there are as a rule enough.
-        return known + _met(reach, nearest)[: max(0, _CROWD - len(known))]
+        return _met(reach, firm) + _met(reach, _nearest(reach, vague, 4 * _CROWD))[:_CROWD]
 
     def _judge(self, robot: Robot, keyframe: Keyframe, now_ns: int) -> None:
         name, former = robot.id, self._judged.get(robot.id)

@@ -205,32 +205,6 @@ def test_who_was_judged_before_anything_was_known_is_judged_again() -> None:
     assert len(partners(scene.station, "r0")) == 7
 
 
-def test_as_long_as_views_are_endless_a_crowd_costs_each_robot_no_more_than_its_nearest() -> None:
-    scene = Scene.of(retry_after_s=1e6, capacity=1)
-    for number in range(150):
-        scene.send(f"r{number:03}", pose(0.1 * number))
-        scene.tick()
-    assert len(scene.snapshot.records) <= 32 * 150
-    assert partners(scene.station, "r149") == {f"r{number:03}" for number in range(117, 149)}
-    held = partners(scene.station, "r060")
-    scene.send("r060", pose(6.0))
-    scene.tick()
-    assert partners(scene.station, "r060") >= held
-    hoods = scene.station._surveys.neighbourhoods
-    for number in range(150):
-        robot = scene.station._roster[f"r{number:03}"]
-        hoods.deepen(robot, Outlook(robot.keyframe, robot.keyframe.pose, flat(0.25), 20, {}, (0.5, 0.5, 0.5)))
-    # Those who were judged when nothing was known are judged again, some at a time.
-    judged = [len(hoods.judge(scene.now_ns)) for _ in range(10)]
-    assert max(judged[1:]) <= 16
-    reaches = hoods._reaches
-    assert not any(reach.endless for reach in reaches.values())
-    for other in ("r000", "r060", "r149"):
-        assert partners(scene.station, other) == {
-            name for name in reaches if name != other and reaches[name].frustum.may_meet(reaches[other].frustum)
-        }
-
-
 def test_who_may_be_met_from_another_pose_can_be_asked() -> None:
     scene = two_sides()
     hoods = scene.station._surveys.neighbourhoods
