@@ -11,6 +11,8 @@ from covista_service.perception.extent import Box
 
 # Boxes smaller than 2^-10 m lie in cells of that size.
 _FINEST = -10
+# Of so many levels of cells one is a rung, on which all smaller boxes lie too.
+_RUNG = 2
 Cell = tuple[int, int, int, int]
 _Place = TypeVar("_Place", int, Cell)
 
@@ -18,14 +20,19 @@ _Place = TypeVar("_Place", int, Cell)
 class Grid:
     """Boxes on cubic cells, each on the level where cells are as wide as the box or up to twice as wide.
 
-    So a box lies in at most eight cells, whatever its size, and who asks for what meets a box looks into the cells that
-    it covers on every level in use. Boxes that are endless are held against everything.
+    So a box lies in at most eight cells of its level, whatever its size, and in at most eight of each second level
+    above it, up to what is larger than any box so far. Who asks for what meets a box looks into the cells that it
+    covers on levels no finer than its own, and for all that is smaller into those on one: none of it follows how many
+    boxes there are elsewhere. Boxes that are endless are held against everything.
     """
 
     def __init__(self) -> None:
         self._boxes: dict[str, Box] = {}
         self._levels: dict[int, dict[str, None]] = {}
         self._cells: dict[Cell, dict[str, None]] = {}
+        # By cells of a rung, what is smaller; and the highest rung.
+        self._smaller: dict[Cell, dict[str, None]] = {}
+        self._top: int | None = None
         self._endless: dict[str, None] = {}
 
     def __len__(self) -> int:
@@ -42,9 +49,11 @@ class Grid:
         if level is None:
             self._endless[name] = None
             return
+        self._raise(level)
         self._levels.setdefault(level, {})[name] = None
         for cell in _cells(box, level):
             self._cells.setdefault(cell, {})[name] = None
+        self._climb(name, box, level)
 
     def remove(self, name: str) -> None:
         """Take a box out, if it is there."""
@@ -58,16 +67,49 @@ class Grid:
         _drop(self._levels, level, name)
         for cell in _cells(box, level):
             _drop(self._cells, cell, name)
+        for rung in self._rungs(level):
+            for cell in _cells(box, rung):
+                _drop(self._smaller, cell, name)
 
     def meeting(self, box: Box) -> list[str]:
         """Names of all whose boxes touch this one, in the order in which they lie here."""
-        if _level(box) is None:
+        size = _level(box)
+        if size is None or self._top is None:
             found = dict.fromkeys(self._boxes)
         else:
-            found = dict.fromkeys(self._endless)
+            rung = min(_RUNG * (size // _RUNG), self._top)
+            found = self._endless | self._below(rung, box)
             for level, names in self._levels.items():
-                found |= self._on(level, names, box)
+                if level >= rung:
+                    found |= self._on(level, names, box)
         return [name for name in found if _touch(self._boxes[name], box)]
+
+    def _rungs(self, level: int, above: int = _FINEST - _RUNG) -> range:
+        """Rungs that are higher than a level, and than another rung."""
+        top = above if self._top is None else self._top
+        return range(max(_RUNG * (level // _RUNG), above) + _RUNG, top + 1, _RUNG)
+
+    def _climb(self, name: str, box: Box, level: int, above: int = _FINEST - _RUNG) -> None:
+        for rung in self._rungs(level, above):
+            for cell in _cells(box, rung):
+                self._smaller.setdefault(cell, {})[name] = None
+
+    def _raise(self, level: int) -> None:
+        """Let the highest rung be above this level: a few times in the life of a swarm."""
+        top, self._top = self._top, max(_RUNG * (level // _RUNG + 1), _FINEST if self._top is None else self._top)
+        if top is not None and top < self._top:
+            for size, names in self._levels.items():
+                for name in names:
+                    self._climb(name, self._boxes[name], size, top)
+
+    def _below(self, rung: int, box: Box) -> dict[str, None]:
+        """What may touch a box of all that is smaller than a rung's cells."""
+        if _count(box, rung) > len(self._boxes):
+            return {name: None for level, names in self._levels.items() if level < rung for name in names}
+        found: dict[str, None] = {}
+        for cell in _cells(box, rung):
+            found |= self._smaller.get(cell, {})
+        return found
 
     def _on(self, level: int, names: dict[str, None], box: Box) -> dict[str, None]:
         """Who may touch a box on one level: by its cells, or all where those are more than there are boxes."""

@@ -53,7 +53,7 @@ def test_what_was_taken_out_leaves_nothing_behind(changes) -> None:
             grid.put(name, box)
     for name, _ in changes:
         grid.remove(name)
-    assert (len(grid), grid._cells, grid._levels, grid._endless) == (0, {}, {}, {})
+    assert (len(grid), grid._cells, grid._smaller, grid._levels, grid._endless) == (0, {}, {}, {}, {})
 
 
 @given(boxes())
@@ -62,6 +62,7 @@ def test_a_box_lies_in_few_cells_whatever_its_size(box: Box) -> None:
     grid.put("one", box)
     # Eight, but for what is so far off that a coordinate cannot tell the width of a cell.
     assert len(grid._cells) <= 27
+    assert len(grid._smaller) <= 27
 
 
 @pytest.mark.parametrize("count", [50, 1000])
@@ -75,3 +76,23 @@ def test_who_asks_looks_at_its_neighbours_alone(count: int, monkeypatch: pytest.
         grid.put(str(k), ((4.0 * k, 0, 0), (4.0 * k + 5, 5, 5)))
     assert grid.meeting(((80.5, 1, 1), (84.5, 2, 2))) == ["19", "20", "21"]
     assert len(looked) <= 9
+
+
+@pytest.mark.parametrize("count", [200, 2000])
+@pytest.mark.parametrize("length_m", [64.0, 100.0, 129.0])
+def test_who_sees_far_looks_at_those_before_it_alone(
+    count: int, length_m: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looked = []
+    monkeypatch.setattr(
+        "covista_service.station.grid._touch", lambda one, other: looked.append(one) or touch(one, other)
+    )
+    grid = Grid()
+    for k in range(count):
+        # Near-sighted ones on several levels, in a row much longer than any view.
+        grid.put(str(k), ((4.0 * k, 0, 0), (4.0 * k + 1.5 * 2 ** (k % 4), 5, 5)))
+    far = ((80.5, 1, 1), (80.5 + length_m, 1 + length_m, 1 + length_m))
+    grid.put("far", far)
+    found = grid.meeting(far)
+    assert length_m / 4 <= len(found) <= length_m / 4 + 6
+    assert len(looked) <= 5 * len(found)
