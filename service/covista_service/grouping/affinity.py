@@ -13,6 +13,8 @@ from covista_service.grouping import similarity as eqs
 from covista_service.grouping.similarity import Floats, Sigma
 
 _FIRST_ROOM = 16
+# There is more room made by a quarter: pairs without robots take memory too, and are never given back.
+_ROOM_SHARE = 4
 # Columns whose distances are summed together.
 _BLOCK = 32
 # Farther than this no robot of a swarm is from the origin, and squares keep clear of overflow.
@@ -74,7 +76,7 @@ class Affinity:
         place = _checked(robot, position_m)
         slot = len(self._slot)
         if slot == len(self._position_m):
-            self._make_room(2 * slot)
+            self._make_room(slot + slot // _ROOM_SHARE)
         self._slot[robot] = slot
         for matrix in (self._overlap, self._mutual):
             matrix[slot, : slot + 1] = matrix[: slot + 1, slot] = np.nan

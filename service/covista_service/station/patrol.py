@@ -20,6 +20,8 @@ _ROBOTS = 8
 _VAIN_NS = NS_PER_S
 _NEVER = np.iinfo(np.int64).min // 2
 _FIRST_ROOM = 16
+# Room grows by a quarter: it is for pairs.
+_ROOM_SHARE = 4
 # Who is looked after otherwise, by robot.
 Beside = Callable[[str], Collection[str]]
 Moments = NDArray[np.int64]
@@ -116,9 +118,10 @@ class Patrol:
     def _enter(self, robot: str) -> None:
         slot = len(self._names)
         if slot == len(self._used):
-            wider: Moments = np.full((2 * slot, 2 * slot), _NEVER)
+            more = slot // _ROOM_SHARE
+            wider: Moments = np.full((slot + more, slot + more), _NEVER)
             wider[:slot, :slot] = self._tried
             self._tried = wider
-            self._used = np.concatenate((self._used, np.full(slot, _NEVER)))
+            self._used = np.concatenate((self._used, np.full(more, _NEVER)))
         self._slot[robot] = slot
         self._names.append(robot)

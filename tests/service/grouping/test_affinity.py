@@ -13,7 +13,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 
 from tests.service.grouping.swarms import Floats, distances
 
-# More than a block of sums, and more than two doublings of the first room.
+# More than a block of sums, and more than the first room can take.
 CROWD = 48
 SIGMAS = ("shared", "std", 2.5)
 # Below it a robot stands where the other stands, as far as squares can tell.
@@ -450,3 +450,12 @@ def test_a_row_of_what_is_no_share_or_of_the_robot_itself_is_refused_and_changes
             affinity.see_row("r0", others, np.array(q))
     affinity.see_row("r0", [], np.zeros((0, 2)))
     assert np.isnan(affinity.mutual[np.triu_indices(3, 1)]).all()
+
+
+def test_room_for_pairs_follows_the_number_of_robots_and_is_not_made_for_each() -> None:
+    affinity, rooms = Affinity(), []
+    for number in range(300):
+        affinity.add(f"r{number:03}", (number, 0.0, 0.0))
+        rooms.append(len(affinity._overlap))
+    assert all(room <= max(16, 1.25 * count) for count, room in enumerate(rooms, 1))
+    assert len(set(rooms)) < 20

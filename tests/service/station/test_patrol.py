@@ -119,12 +119,19 @@ def test_who_comes_and_goes_does_not_mix_up_the_others(steps) -> None:
     """Against a table by names."""
     patrol, now_ns, there = Patrol(RETRY_NS), START_NS, []
     tried: dict[frozenset[str], int] = {}
+    used: dict[str, int] = {}
+
+    def due(name: str, other: str) -> bool:
+        last_ns = tried.get(frozenset((name, other)), -RETRY_NS)
+        return max(used[name], used[other]) > last_ns and now_ns - last_ns >= RETRY_NS
+
     for kind, number in steps:
         now_ns += S
         name = f"r{number}"
         if kind == "come":
             patrol.keyframe(name)
             there += [] if name in there else [name]
+            used[name] = now_ns
         elif kind == "go" and name in there:
             patrol.forget(name)
             there.remove(name)
@@ -132,7 +139,11 @@ def test_who_comes_and_goes_does_not_mix_up_the_others(steps) -> None:
         elif kind == "try" and (pair := patrol.next(now_ns, nobody)) is not None:
             assert set(pair) <= set(there)
             assert now_ns - tried.get(frozenset(pair), -RETRY_NS) >= RETRY_NS
-            # Of the robot whose turn it is, the one tried longest ago.
+            # With the robot whose turn it is, the one tried longest ago.
+            turn = patrol._names[patrol._turn]
+            others = [other for other in there if other != turn and due(turn, other)]
+            assert turn in pair
+            assert tried.get(frozenset(pair), 0) == min(tried.get(frozenset((turn, other)), 0) for other in others)
             patrol.tried(pair, now_ns, budgeted=True)
             tried[frozenset(pair)] = now_ns
     for name in list(there):
@@ -153,3 +164,11 @@ def test_it_looks_at_few_robots_at_a_time_and_rests_when_there_is_nothing() -> N
     for _ in range(100):
         assert watch.patrol.next(START_NS, everybody) is None
     assert asked.total() <= 108
+
+
+def test_room_for_moments_follows_the_number_of_robots() -> None:
+    patrol = Patrol(RETRY_NS)
+    for number in range(200):
+        patrol.keyframe(f"r{number}")
+    assert patrol._tried.shape == (len(patrol._used),) * 2
+    assert 200 <= len(patrol._used) <= 250
