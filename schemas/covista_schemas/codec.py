@@ -61,6 +61,8 @@ CODES = (
 )
 # A pose with its covariance has some 400 bytes; the rest is for fields that are not known yet.
 MAX_POSE_BYTES = 16 * 1024
+# As much as zenoh hands over in one piece.
+MAX_KEYFRAME_BYTES = 4 * 1024 * 1024
 
 _M = TypeVar("_M", bound=Message)
 _Vector = tuple[float, float, float]
@@ -123,6 +125,7 @@ def encode_pose(update: PoseUpdate) -> bytes:
 
 def decode_keyframe(data: bytes, *, robot: str | None = None) -> Keyframe:
     """The keyframe in `data`; with `robot`, the id inside must be that of the key. Raises DecodeError."""
+    check_size(len(data), MAX_KEYFRAME_BYTES)
     message = _parse(pb.Keyframe(), data)
     _check_sender(message.robot, message.boot, robot)
     camera = _decode_camera(message.camera)
@@ -143,8 +146,7 @@ def decode_keyframe(data: bytes, *, robot: str | None = None) -> Keyframe:
 
 def decode_pose(data: bytes, *, robot: str | None = None) -> PoseUpdate:
     """The pose in `data`; with `robot`, the id inside must be that of the key. Raises DecodeError."""
-    if len(data) > MAX_POSE_BYTES:
-        raise too_large_pose(len(data))
+    check_size(len(data), MAX_POSE_BYTES)
     message = _parse(pb.Pose(), data)
     _check_sender(message.robot, message.boot, robot)
     pose = _decode_pose(message, tuple(message.covariance))
@@ -153,19 +155,20 @@ def decode_pose(data: bytes, *, robot: str | None = None) -> PoseUpdate:
 
 def peek_keyframe(data: bytes, *, robot: str | None = None) -> tuple[str, str, int]:
     """Only (robot, boot, sequence) of the keyframe in `data`, checked as `decode_keyframe` does. Raises DecodeError."""
+    check_size(len(data), MAX_KEYFRAME_BYTES)
     return _peek(pb.Keyframe(), data, robot)
 
 
 def peek_pose(data: bytes, *, robot: str | None = None) -> tuple[str, str, int]:
     """Only (robot, boot, sequence) of the pose in `data`, checked as `decode_pose` does. Raises DecodeError."""
-    if len(data) > MAX_POSE_BYTES:
-        raise too_large_pose(len(data))
+    check_size(len(data), MAX_POSE_BYTES)
     return _peek(pb.Pose(), data, robot)
 
 
-def too_large_pose(size: int) -> DecodeError:
-    """What is wrong with a pose of so many bytes."""
-    return DecodeError(TOO_LARGE, "payload", f"{size} bytes, more than the {MAX_POSE_BYTES} that a pose may have")
+def check_size(size: int, most: int) -> None:
+    """Raise DecodeError if a message has more bytes than one of its kind may have."""
+    if size > most:
+        raise DecodeError(TOO_LARGE, "payload", f"{size} bytes, more than the {most} that it may have")
 
 
 def _peek(message: pb.Keyframe | pb.Pose, data: bytes, robot: str | None) -> tuple[str, str, int]:

@@ -1,11 +1,10 @@
 """Which message is it? Read from the bytes of one after the other, as `codec.peek_*` does, at a fraction of its cost.
 
-A reader keeps what it can use again: a message to parse into, and the ids that were found to be valid.
+A reader keeps what it can use again: a message to parse into, and the ids that were found to be valid. A message
+that is parsed into again keeps the memory of all that it ever held, so that it is used for some bytes and no more.
 """
 
 from __future__ import annotations
-
-import sys
 
 from google.protobuf.message import DecodeError as ProtobufDecodeError
 
@@ -14,15 +13,19 @@ from covista_schemas import robot_pb2 as pb
 from covista_schemas.errors import DecodeError, KeyExpressionError
 
 _MAX_IDS = 16_384
+# Some hundreds of poses, and never more than one keyframe.
+_BYTES_PER_MESSAGE = 64 * 1024
 
 
 class NameReader:
     """Reads (boot, sequence) of the messages of one topic; for one thread."""
 
-    def __init__(self, message: pb.Keyframe | pb.Pose) -> None:
-        """`message` is an empty one of the topic's kind."""
-        self._message = message
-        self._most_bytes = codec.MAX_POSE_BYTES if isinstance(message, pb.Pose) else sys.maxsize
+    def __init__(self, kind: type[pb.Keyframe] | type[pb.Pose]) -> None:
+        """`kind` is the topic's message."""
+        self._kind = kind
+        self._most_bytes = codec.MAX_POSE_BYTES if kind is pb.Pose else codec.MAX_KEYFRAME_BYTES
+        self._message = kind()
+        self._held_bytes = 0
         self._boots: set[str] = set()
 
     def read(self, data: bytes, robot: str) -> tuple[str, int] | str:
@@ -30,9 +33,9 @@ class NameReader:
 
         `robot` is the id in the key, a valid one; the id inside must be the same.
         """
-        message = self._message
         if len(data) > self._most_bytes:
             return codec.TOO_LARGE
+        message = self._room(len(data))
         try:
             message.ParseFromString(data)
         except ProtobufDecodeError:
@@ -46,12 +49,19 @@ class NameReader:
 
     def complain(self, data: bytes, robot: str) -> str:
         """What is wrong with a message that could not be read, in words."""
-        peek = codec.peek_pose if isinstance(self._message, pb.Pose) else codec.peek_keyframe
+        peek = codec.peek_pose if self._kind is pb.Pose else codec.peek_keyframe
         try:
             peek(data, robot=robot)
         except DecodeError as error:
             return str(error)
         return ""
+
+    def _room(self, size: int) -> pb.Keyframe | pb.Pose:
+        """A message to parse so many bytes into."""
+        self._held_bytes += size
+        if self._held_bytes > _BYTES_PER_MESSAGE:
+            self._message, self._held_bytes = self._kind(), size
+        return self._message
 
     def _learn(self, boot: str) -> bool:
         try:
@@ -68,7 +78,7 @@ class KeyReader:
     """Which robot a key names, for one topic of all robots; for one thread."""
 
     def __init__(self) -> None:
-        self._robots: dict[str, str | None] = {}
+        self._robots: dict[str, str] = {}
 
     def read(self, key: str) -> str | None:
         """The robot's id, None where the key is not one that a robot publishes on."""
@@ -81,7 +91,8 @@ class KeyReader:
         try:
             robot = keys.parse_robot_key(key).robot
         except KeyExpressionError:
-            robot = None
+            # Not remembered: wrong keys without end must not make the right ones be forgotten.
+            return None
         if len(self._robots) >= _MAX_IDS:
             self._robots.clear()
         self._robots[key] = robot

@@ -1,5 +1,8 @@
+import gc
+
+import psutil
 import pytest
-from covista_schemas import codec, keys, names
+from covista_schemas import codec, keys, names, zenoh_config
 from covista_schemas import robot_pb2 as pb
 from covista_schemas.errors import DecodeError, KeyExpressionError
 from covista_schemas.names import KeyReader, NameReader
@@ -58,7 +61,7 @@ def peeked(data: bytes, topic: str) -> tuple[str, int] | str:
 
 @given(st.lists(payloads(), max_size=6), st.sampled_from(["pose", "keyframe"]))
 def test_a_reader_says_what_peeking_says_whatever_it_read_before(stream: list[bytes], topic: str) -> None:
-    reader = NameReader(pb.Pose() if topic == "pose" else pb.Keyframe())
+    reader = NameReader(pb.Pose if topic == "pose" else pb.Keyframe)
     for data in stream:
         said = peeked(data, topic)
         assert reader.read(data, "r1") == said
@@ -66,12 +69,12 @@ def test_a_reader_says_what_peeking_says_whatever_it_read_before(stream: list[by
 
 
 def test_what_is_wrong_is_said_in_the_words_of_the_codec() -> None:
-    reader = NameReader(pb.Pose())
+    reader = NameReader(pb.Pose)
     stranger = pb.Pose(robot="r2", boot="b0").SerializeToString()
     assert reader.read(stranger, "r1") == codec.WRONG_ID
     assert reader.complain(stranger, "r1") == "robot: 'r2' inside, but 'r1' in the key"
     assert reader.read(bytes(codec.MAX_POSE_BYTES + 1), "r1") == codec.TOO_LARGE
-    assert "more than the 16384" in reader.complain(bytes(codec.MAX_POSE_BYTES + 1), "r1")
+    assert "more than the 16384 that it may" in reader.complain(bytes(codec.MAX_POSE_BYTES + 1), "r1")
 
 
 @pytest.fixture
@@ -81,7 +84,7 @@ def few_ids(monkeypatch: pytest.MonkeyPatch) -> int:
 
 
 def test_what_is_remembered_is_bounded_and_forgetting_changes_nothing(few_ids: int) -> None:
-    boots, robots = NameReader(pb.Pose()), KeyReader()
+    boots, robots = NameReader(pb.Pose), KeyReader()
     for _ in range(2):
         for number in range(10):
             data = pb.Pose(robot="r1", boot=f"b{number}", sequence=number).SerializeToString()
@@ -103,3 +106,45 @@ def test_keys_are_read_as_parsing_reads_them(chunks: list[str]) -> None:
     except KeyExpressionError:
         robot = None
     assert reader.read(key) == reader.read(key) == robot
+
+
+def test_wrong_keys_without_end_are_not_remembered(few_ids: int) -> None:
+    reader = KeyReader()
+    assert reader.read(keys.pose("s", "r1")) == "r1"
+    for number in range(2 * few_ids):
+        assert reader.read(f"covista/s/robots/R{number}/pose") is None
+    assert list(reader._robots) == [keys.pose("s", "r1")]
+
+
+def test_a_keyframe_may_be_as_large_as_zenoh_hands_over() -> None:
+    reader = NameReader(pb.Keyframe)
+    assert codec.MAX_KEYFRAME_BYTES == zenoh_config.MAX_MESSAGE_BYTES
+    head = pb.Keyframe(robot="r1", boot="b0").SerializeToString()
+    room = codec.MAX_KEYFRAME_BYTES - len(head) - 6
+    whole = pb.Keyframe(robot="r1", boot="b0", image=bytes(room)).SerializeToString()
+    assert codec.MAX_KEYFRAME_BYTES - 4 <= len(whole) <= codec.MAX_KEYFRAME_BYTES
+    assert reader.read(whole, "r1") == ("b0", 0)
+    assert reader.read(whole + bytes(6), "r1") == codec.TOO_LARGE
+    assert "more than the 4194304" in reader.complain(whole + bytes(6), "r1")
+
+
+@pytest.mark.parametrize(
+    ("data", "kind", "count"),
+    [
+        (pb.Keyframe(robot="r1", boot="b0", image=bytes(100_000)).SerializeToString(), pb.Keyframe, 2000),
+        (pb.Pose(robot="r1", boot="b0", covariance=[0.1] * 36).SerializeToString(), pb.Pose, 200_000),
+        (b"\x0a\x02r1" + bytes(16_000), pb.Pose, 5000),
+    ],
+    ids=["keyframes", "poses", "garbage"],
+)
+def test_reading_without_end_takes_no_more_memory(
+    data: bytes, kind: type[pb.Keyframe] | type[pb.Pose], count: int
+) -> None:
+    reader, process = NameReader(kind), psutil.Process()
+    for _ in range(count // 100):
+        reader.read(data, "r1")
+    gc.collect()
+    before = process.memory_info().rss
+    for _ in range(count):
+        reader.read(data, "r1")
+    assert process.memory_info().rss - before < 20_000_000

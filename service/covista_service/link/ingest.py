@@ -91,8 +91,8 @@ class _Opener:
         self._mailboxes = mailboxes
         self._clock = clock
         self._keys = KeyReader()
-        self._names = NameReader(pb.Pose() if topic == "pose" else pb.Keyframe())
-        self._most_bytes = codec.MAX_POSE_BYTES if topic == "pose" else None
+        self._names = NameReader(pb.Pose if topic == "pose" else pb.Keyframe)
+        self._most_bytes = codec.MAX_POSE_BYTES if topic == "pose" else codec.MAX_KEYFRAME_BYTES
 
     def open(self, sample: zenoh.Sample) -> None:
         """Put a message into its robot's mailbox."""
@@ -102,11 +102,9 @@ class _Opener:
             self._mailboxes.turn_away(WRONG_KEY)
             return
         payload = sample.payload
-        if self._most_bytes is not None and len(payload) > self._most_bytes:
-            size = len(payload)
-            self._mailboxes.refuse(
-                robot, self._topic, codec.TOO_LARGE, lambda: str(codec.too_large_pose(size)), arrived_ns
-            )
+        if (size := len(payload)) > self._most_bytes:
+            text = f"{size} bytes, more than the {self._most_bytes} that it may have"
+            self._mailboxes.refuse(robot, self._topic, codec.TOO_LARGE, lambda: f"payload: {text}", arrived_ns)
             return
         data = payload.to_bytes()
         name = self._names.read(data, robot)
