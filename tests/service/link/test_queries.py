@@ -1,4 +1,6 @@
+import threading
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -6,9 +8,10 @@ import zenoh
 from covista_schemas import keys
 from covista_schemas.reports import GroupsReport, PairReport, Problem, RobotReport, SimilarityReport
 from covista_service import answers
-from covista_service.link.queries import Queries
+from covista_service.link.queries import MAX_WAITING, Queries, Replies
 from covista_service.station.snapshot import Snapshot
 
+from tests.service.deadline import wait_until
 from tests.service.link.conftest import Air
 from tests.service.station.scenes import Scene
 
@@ -78,3 +81,85 @@ def test_a_station_that_is_busy_says_so(air: Air) -> None:
     queries.close()
     assert reply.err is not None
     assert Problem.model_validate_json(reply.err.payload.to_bytes()).status == 503
+
+
+def test_who_comes_when_many_wait_is_told_so_and_the_others_are_answered(air: Air, snapshot: Snapshot) -> None:
+    asked, go_on = threading.Event(), threading.Event()
+
+    def slowly() -> Snapshot:
+        asked.set()
+        assert go_on.wait(10.0)
+        return snapshot
+
+    queries = Queries(air.station, "crowd", slowly)
+    replies: list[zenoh.Reply] = []
+    key, more = keys.groups("crowd"), 3 * MAX_WAITING
+    try:
+        air.rover.get(key, replies.append, timeout=20.0)
+        assert asked.wait(10.0)
+        for _ in range(MAX_WAITING + more):
+            air.rover.get(key, replies.append, timeout=20.0)
+        wait_until(lambda: len(replies) == more, "those turned away")
+        problems = [Problem.model_validate_json(reply.err.payload.to_bytes()) for reply in replies if reply.err]
+        assert [(problem.title, problem.status) for problem in problems] == [("The station is busy", 503)] * more
+        go_on.set()
+        wait_until(lambda: len(replies) == 1 + MAX_WAITING + more, "the others")
+        assert all(reply.ok for reply in replies[more:])
+    finally:
+        go_on.set()
+        queries.close()
+
+
+def test_who_still_waits_at_the_end_is_told_so(air: Air, snapshot: Snapshot) -> None:
+    asked, go_on = threading.Event(), threading.Event()
+
+    def slowly() -> Snapshot:
+        asked.set()
+        assert go_on.wait(10.0)
+        return snapshot
+
+    queries = Queries(air.station, "ending", slowly)
+    replies: list[zenoh.Reply] = []
+    for _ in range(3):
+        air.rover.get(keys.groups("ending"), replies.append, timeout=20.0)
+    assert asked.wait(10.0)
+    wait_until(lambda: len(queries._waiting) == 2)
+    closing = threading.Thread(target=queries.close)
+    closing.start()
+    wait_until(lambda: queries._closing)
+    go_on.set()
+    closing.join()
+    wait_until(lambda: len(replies) == 3, "an answer for everybody")
+    assert sorted(bool(reply.ok) for reply in replies) == [False, False, True]
+
+
+def test_what_is_large_is_made_once_while_it_stands(snapshot: Snapshot) -> None:
+    replies = Replies(SITE)
+    for key in (keys.similarity(SITE), keys.groups(SITE)):
+        first = replies.to(key, snapshot)
+        assert replies.to(key, replace(snapshot, now_ns=snapshot.now_ns + 1)) is first
+    later = replace(
+        snapshot,
+        similarity=replace(snapshot.similarity, revision=snapshot.similarity.revision + 1),
+        groups=replace(snapshot.groups, scores=((2, 0.5),)),
+    )
+    similarity = SimilarityReport.model_validate_json(replies.to(keys.similarity(SITE), later).to_bytes())
+    assert similarity == answers.similarity_report(later)
+    assert GroupsReport.model_validate_json(replies.to(keys.groups(SITE), later).to_bytes()).scores[0].score == 0.5
+
+
+def test_a_fault_in_one_answer_costs_that_answer_alone(
+    air: Air, snapshot: Snapshot, caplog: pytest.LogCaptureFixture
+) -> None:
+    faults = [ZeroDivisionError()]
+
+    def faulty() -> Snapshot:
+        if faults:
+            raise faults.pop()
+        return snapshot
+
+    queries = Queries(air.station, "faulty", faulty)
+    assert not list(air.rover.get(keys.groups("faulty"), timeout=10.0))
+    assert ask(air, keys.groups("faulty")).ok is not None
+    assert "ZeroDivisionError" in caplog.text
+    queries.close()
