@@ -12,18 +12,20 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from covista_service.link.places import IDLE_NS, TOO_MANY_ROBOTS, UNKNOWN_ROBOT, Places
+from covista_service.link.places import IDLE_NS, TOO_MANY_ROBOTS, UNKNOWN_ROBOT, Places, Word
+from covista_service.link.surplus import Surplus
 from covista_service.link.turns import Pace, Turns
 from covista_service.station.events import Topic
+from covista_service.station.ledger import MessageId
 
 __all__ = ["IDLE_NS", "OVERFLOW", "TOO_MANY_ROBOTS", "UNKNOWN_ROBOT", "Depths", "Letter", "Mail", "Mailboxes"]
 
-MessageId = tuple[str, int]
 OVERFLOW = "overflow"
+TOO_FAST = "came faster than the station could take it"
 MAX_ROBOTS = 4096
 # Waiting payloads of all robots, in all.
 MAX_BYTES = 256 * 1024 * 1024
-# Names of messages, and boots of tokens, that a robot may have waiting; beyond, they are counted only.
+# Names of messages, and boots of tokens, that a robot may have waiting; beyond, messages are surplus and tokens not heard.
 MAX_NAMES = 16_384
 MAX_TOKENS = 64
 
@@ -83,14 +85,20 @@ class Box:
     kept: Letter | None = None
     kept_at: int = 0
     refusals: dict[str, Refusal] = field(default_factory=dict)
+    surplus: Surplus = field(default_factory=Surplus)
     arrived_ns: int = 0
 
-    def refuse(self, code: str, explain: Explain) -> None:
-        """Count a message that is not even worth a name; only the first of a burst is put into words."""
+    def refuse(self, code: str, text: str) -> None:
+        """Count a message that has no readable name."""
         refusal = self.refusals.get(code)
         if refusal is None:
-            refusal = self.refusals[code] = Refusal(0, explain())
+            refusal = self.refusals[code] = Refusal(0, text)
         refusal.count += 1
+
+    def give_up(self, name: MessageId) -> None:
+        """Count a message that there is no place for."""
+        if not self.surplus.add(name):
+            self.refuse(OVERFLOW, TOO_FAST)
 
     def put(self, letter: Letter) -> None:
         """Take a message in; where there is no place for its name, one that is not the newest loses its own."""
@@ -99,11 +107,12 @@ class Box:
         if len(self.names) < MAX_NAMES:
             self.names.append(letter.name)
             at = len(self.names) - 1
-        else:
-            self.refuse(OVERFLOW, _too_fast)
+        elif newest:
             at = self.kept_at
-            if newest:
-                self.names[at] = letter.name
+            self.give_up(self.names[at])
+            self.names[at] = letter.name
+        else:
+            self.give_up(letter.name)
         if newest:
             self.kept, self.kept_at = letter, at
 
@@ -126,6 +135,7 @@ class Mailboxes:
     def __init__(
         self, max_robots: int = MAX_ROBOTS, max_bytes: int = MAX_BYTES, paces: Mapping[Line, Pace] = PACES
     ) -> None:
+        self._max_robots = max_robots
         self._max_bytes = max_bytes
         self._lock = threading.Lock()
         self._mail: dict[str, Mail] = {}
@@ -163,7 +173,7 @@ class Mailboxes:
     def put(self, letter: Letter) -> None:
         """Put a message; it replaces what is waiting, unless it is older within the same boot."""
         with self._lock:
-            mail = self._open(letter.robot, letter.arrived_ns, readable=True)
+            mail = self._open(letter.robot, letter.arrived_ns, "message")
             sooner = mail is not None and self._put(mail, letter)
         if sooner:
             self._wake()
@@ -171,18 +181,21 @@ class Mailboxes:
     def refuse(self, robot: str, topic: Topic, code: str, explain: Explain, arrived_ns: int) -> None:
         """Count a message of a robot that is so broken that its name cannot be read; `explain` says what is wrong."""
         with self._lock:
-            mail = self._open(robot, arrived_ns, readable=False)
-            sooner = False
-            if mail is not None:
-                box, sooner = self._box(mail, topic, arrived_ns)
-                box.refuse(code, explain)
+            if not self._admit(robot, arrived_ns, "garbage") or self._refuse_likewise(robot, topic, code, arrived_ns):
+                return
+        # Nobody else waits while the first of a burst is put into words.
+        text = explain()
+        with self._lock:
+            box, sooner = self._box(self._mail_of(robot), topic, arrived_ns)
+            box.refuse(code, text)
         if sooner:
             self._wake()
 
     def token(self, robot: str, boot: str, alive: bool, arrived_ns: int) -> None:
         """Note that a liveliness token appeared or vanished."""
         with self._lock:
-            mail = self._open(robot, arrived_ns, readable=True)
+            leaves = not alive and robot not in self._places
+            mail = self._farewell(robot) if leaves else self._open(robot, arrived_ns, "token")
             sooner = mail is not None and self._token(mail, boot, alive, arrived_ns)
         if sooner:
             self._wake()
@@ -201,22 +214,45 @@ class Mailboxes:
             self._awaited_ns = min((next_ns for next_ns in nexts_ns if next_ns is not None), default=None)
             return list(handed.values()), self._awaited_ns
 
-    def _open(self, robot: str, now_ns: int, *, readable: bool) -> Mail | None:
+    def _open(self, robot: str, now_ns: int, word: Word) -> Mail | None:
         """The robot's mail, None where there is no place for it."""
-        reason = self._places.admit(robot, now_ns, readable=readable, waiting=self._mail)
+        return self._mail_of(robot) if self._admit(robot, now_ns, word) else None
+
+    def _admit(self, robot: str, now_ns: int, word: Word) -> bool:
+        reason = self._places.admit(robot, now_ns, word, waiting=self._mail)
         if reason is not None:
             self._turned_away[reason] += 1
+        return reason is None
+
+    def _farewell(self, robot: str) -> Mail | None:
+        """Mail of a robot whose place was given away, for the end of a token that the station may have heard of."""
+        if len(self._mail) >= 2 * self._max_robots:
+            self._turned_away[TOO_MANY_ROBOTS] += 1
             return None
+        return self._mail_of(robot)
+
+    def _mail_of(self, robot: str) -> Mail:
         mail = self._mail.get(robot)
         if mail is None:
             mail = self._mail[robot] = Mail(robot)
         return mail
 
+    def _refuse_likewise(self, robot: str, topic: Topic, code: str, arrived_ns: int) -> bool:
+        """Count a message whose fault has been put into words since the last drain; False if it has not."""
+        mail = self._mail.get(robot)
+        box = mail.boxes.get(topic) if mail is not None else None
+        refusal = box.refusals.get(code) if box is not None else None
+        if box is None or refusal is None:
+            return False
+        refusal.count += 1
+        box.arrived_ns = arrived_ns
+        return True
+
     def _put(self, mail: Mail, letter: Letter) -> bool:
         box, sooner = self._box(mail, letter.topic, letter.arrived_ns)
         before = _weight(box.kept)
         if self._bytes + len(letter.data) - before > self._max_bytes:
-            box.refuse(OVERFLOW, _too_fast)
+            box.give_up(letter.name)
         else:
             box.put(letter)
             self._bytes += _weight(box.kept) - before
@@ -255,10 +291,6 @@ class Mailboxes:
             self._bytes -= _weight(box.kept)
         if not mail.boxes and not mail.tokens:
             del self._mail[mail.robot]
-
-
-def _too_fast() -> str:
-    return "came faster than the station could take it"
 
 
 def _weight(letter: Letter | None) -> int:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Container
+from typing import Literal
 
+# What was heard of a robot: something that nobody can read, a liveliness token, or a message.
+Word = Literal["garbage", "token", "message"]
 TOO_MANY_ROBOTS = "too_many_robots"
 UNKNOWN_ROBOT = "unknown_robot"
 # A robot silent for so long gives its place to another when the house is full.
@@ -14,42 +17,63 @@ MAX_STRANGERS = 64
 
 
 class Places:
-    """Robots by when they were heard last, and those among them that are strangers still."""
+    """Robots by when they were heard last.
+
+    Strangers among them have sent nothing but garbage. Callers have sent no message either, but have a token: a token
+    costs nothing, so that they give way to whoever sends a message.
+    """
 
     def __init__(self, max_robots: int, max_strangers: int = MAX_STRANGERS) -> None:
         self._max_robots = max_robots
         self._max_strangers = max_strangers
         self._heard_ns: OrderedDict[str, int] = OrderedDict()
         self._strangers: OrderedDict[str, None] = OrderedDict()
+        self._callers: OrderedDict[str, None] = OrderedDict()
 
-    def admit(self, robot: str, now_ns: int, *, readable: bool, waiting: Container[str]) -> str | None:
-        """Note a message, `readable` or not; the reason why there is no place for its robot, None where there is.
+    def __contains__(self, robot: str) -> bool:
+        return robot in self._heard_ns
 
-        Robots with mail `waiting` do not lose their places.
+    def admit(self, robot: str, now_ns: int, word: Word, *, waiting: Container[str]) -> str | None:
+        """Note what was heard of a robot; the reason why there is no place for it, None where there is.
+
+        Robots with mail `waiting` do not lose their places, unless they are callers.
         """
         if robot not in self._heard_ns:
-            reason = self._make_room(now_ns, waiting, stranger=not readable)
+            reason = self._make_room(now_ns, waiting, word)
             if reason is not None:
                 return reason
-            if not readable:
+            if word == "garbage":
                 self._strangers[robot] = None
-        elif readable and self._strangers:
+            elif word == "token":
+                self._callers[robot] = None
+        elif word == "message":
+            self._callers.pop(robot, None)
             self._strangers.pop(robot, None)
+        elif word == "token" and robot in self._strangers:
+            del self._strangers[robot]
+            self._callers[robot] = None
         self._heard_ns[robot] = now_ns
         self._heard_ns.move_to_end(robot)
         return None
 
-    def _make_room(self, now_ns: int, waiting: Container[str], *, stranger: bool) -> str | None:
-        if stranger and len(self._strangers) >= self._max_strangers:
+    def _make_room(self, now_ns: int, waiting: Container[str], word: Word) -> str | None:
+        if word == "garbage" and len(self._strangers) >= self._max_strangers:
             return None if self._evict(next(iter(self._strangers)), now_ns, waiting) else UNKNOWN_ROBOT
-        if len(self._heard_ns) >= self._max_robots:
-            return None if self._evict(next(iter(self._heard_ns)), now_ns, waiting) else TOO_MANY_ROBOTS
+        if len(self._heard_ns) < self._max_robots or self._evict(next(iter(self._heard_ns)), now_ns, waiting):
+            return None
+        if word != "message" or not self._callers:
+            return TOO_MANY_ROBOTS
+        self._take_out(next(iter(self._callers)))
         return None
 
     def _evict(self, robot: str, now_ns: int, waiting: Container[str]) -> bool:
         """Take the place of a robot that has not been heard for long; False if it may keep it."""
         if robot in waiting or now_ns - self._heard_ns[robot] < IDLE_NS:
             return False
+        self._take_out(robot)
+        return True
+
+    def _take_out(self, robot: str) -> None:
         del self._heard_ns[robot]
         self._strangers.pop(robot, None)
-        return True
+        self._callers.pop(robot, None)

@@ -9,7 +9,7 @@ import numpy as np
 from covista_schemas import codec, messages
 from covista_schemas.errors import DecodeError
 
-from covista_service.link.mailbox import Box, Letter, Mail
+from covista_service.link.mailbox import OVERFLOW, TOO_FAST, Box, Letter, Mail
 from covista_service.link.pictures import check_image, check_thumbnail
 from covista_service.perception.camera import Camera, Features, Pose, rotation_of
 from covista_service.perception.extent import UNTOLD, Doubt
@@ -70,6 +70,9 @@ def _accounts(robot: str, topic: Topic, box: Box) -> Iterator[Event]:
         yield MessagesReceived(robot, topic, tuple(box.names), kept, box.arrived_ns)
     for code, refusal in box.refusals.items():
         yield MessageDropped(robot, topic, code, refusal.text, box.arrived_ns, counted=False, count=refusal.count)
+    if box.surplus:
+        count, runs = box.surplus.count, box.surplus.runs()
+        yield MessageDropped(robot, topic, OVERFLOW, TOO_FAST, box.arrived_ns, counted=False, count=count, runs=runs)
 
 
 def _open(letter: Letter) -> Event:

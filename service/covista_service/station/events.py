@@ -12,6 +12,7 @@ from covista_service.perception.camera import Camera, Features, Pose, View
 from covista_service.perception.comparison import Comparison
 from covista_service.perception.extent import UNTOLD, Doubt
 from covista_service.perception.scene import Evidence, Settled, Sight
+from covista_service.station.ledger import Run
 
 Topic = Literal["keyframe", "pose"]
 Pair = tuple[str, str]
@@ -65,7 +66,10 @@ class MessagesReceived:
 
 @dataclass(frozen=True, slots=True)
 class MessageDropped:
-    """A message that cannot be used; `counted` says whether a MessagesReceived has named it before."""
+    """A message that cannot be used; `counted` says whether a MessagesReceived has named it before.
+
+    `runs` names messages that were given up unread, all `count` of them.
+    """
 
     robot: str
     topic: Topic
@@ -74,6 +78,7 @@ class MessageDropped:
     arrived_ns: int
     counted: bool
     count: int = 1
+    runs: tuple[Run, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

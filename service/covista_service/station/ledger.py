@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections import Counter, OrderedDict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -15,6 +15,16 @@ MAX_INTERVALS = 1024
 MAX_BOOTS = 8
 # What became of messages whose fate was open when their robot was forgotten.
 FORGOTTEN = "forgotten"
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """`count` messages of a boot with numbers in [first, end): all of these, or which ones is not known any more."""
+
+    boot: str
+    first: int
+    end: int
+    count: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +98,25 @@ class Sequences:
         self._heard += 1
         return True
 
+    def add_run(self, first: int, end: int, count: int) -> int:
+        """Hear `count` of the numbers in [first, end), and say how many of those were not heard before.
+
+        Where they are not all of these, the others are no longer told apart from what was heard.
+        """
+        starts, ends = self._starts, self._ends
+        left, right = bisect_left(ends, first), bisect_right(starts, end)
+        known = sum(
+            max(0, min(end, ended) - max(first, started))
+            for started, ended in zip(starts[left:right], ends[left:right], strict=True)
+        )
+        fresh = min(count, end - first - known)
+        if left < right:
+            first, end = min(first, starts[left]), max(end, ends[right - 1])
+        starts[left:right], ends[left:right] = [first], [end]
+        self._heard += fresh
+        self._bound()
+        return fresh
+
     def _insert(self, at: int, number: int) -> None:
         joins_left = at > 0 and self._ends[at - 1] == number
         joins_right = at < len(self._starts) and self._starts[at] == number + 1
@@ -101,8 +130,11 @@ class Sequences:
         else:
             self._starts.insert(at, number)
             self._ends.insert(at, number + 1)
-            if len(self._starts) > MAX_INTERVALS:
-                del self._starts[1], self._ends[0]
+            self._bound()
+
+    def _bound(self) -> None:
+        if len(self._starts) > MAX_INTERVALS:
+            del self._starts[1], self._ends[0]
 
 
 class Ledger:
@@ -168,6 +200,14 @@ class Ledger:
         for message in list(self._announced)[:count]:
             del self._announced[message]
             self._dropped[code] += 1
+
+    def give_up(self, code: str, runs: Iterable[Run]) -> None:
+        """Messages of which no more than the name was read, and is heard now."""
+        for run in runs:
+            fresh = self._sequences(run.boot).add_run(run.first, run.end, run.count)
+            self._counts["received"] += run.count
+            self._counts["duplicate"] += run.count - fresh
+            self._dropped[code] += fresh
 
     def close(self) -> None:
         """The robot is forgotten: nothing more can become of what waits."""

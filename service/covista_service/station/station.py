@@ -177,7 +177,11 @@ class Station:
         robot = self._touch(event.robot)
         self._hear(robot, event.arrived_ns)
         robot.last_problem = event.text
-        robot.ledgers[event.topic].drop(event.code, event.count, counted=event.counted)
+        ledger = robot.ledgers[event.topic]
+        if event.runs:
+            ledger.give_up(event.code, event.runs)
+        else:
+            ledger.drop(event.code, event.count, counted=event.counted)
 
     def _hear(self, robot: Robot, arrived_ns: int, time_ns: int | None = None) -> None:
         robot.heard(arrived_ns, time_ns, self._timeline.wall_ns(arrived_ns))

@@ -6,6 +6,7 @@ from covista_service.link import mailbox
 from covista_service.link.mailbox import IDLE_NS, PACES, Depths, Letter, Mailboxes
 from covista_service.link.turns import GRID_NS
 from covista_service.station.events import Topic
+from covista_service.station.ledger import Run
 
 # Later than whatever came.
 NOW_NS = 10 * IDLE_NS
@@ -188,7 +189,7 @@ def test_beyond_its_names_the_newest_is_kept_and_what_it_displaces_is_counted(mo
     assert box.kept is not None
     assert box.kept.name == ("b0", 9)
     assert box.names == [("b0", 0), ("b0", 1), ("b0", 9)]
-    assert box.refusals[mailbox.OVERFLOW].count == 3
+    assert box.surplus.runs() == (Run("b0", 2, 5, 3),)
 
 
 def test_only_the_first_refusal_of_a_burst_is_put_into_words() -> None:
@@ -228,7 +229,7 @@ def test_waiting_payloads_are_bounded_in_all_and_given_back() -> None:
     assert kept["r1"] is not None
     assert len(kept["r1"].data) == 90
     assert kept["r2"] is None
-    assert first[1].boxes["keyframe"].refusals[mailbox.OVERFLOW].count == 1
+    assert first[1].boxes["keyframe"].surplus.runs() == (Run("b0", 0, 1, 1),)
     boxes.put(letter("r2", 1, size=100))
     (mail,), _ = boxes.drain(10, NOW_NS)
     assert mail.boxes["keyframe"].kept is not None
@@ -301,3 +302,55 @@ def test_depths_are_what_waits_and_nothing_when_it_is_taken() -> None:
     assert boxes.depths() == Depths(1, 1, 5)
     boxes.drain(1, NOW_NS)
     assert boxes.depths() == Depths(0, 0, 0)
+
+
+def test_while_a_fault_is_put_into_words_others_are_served_and_all_is_counted() -> None:
+    boxes = Mailboxes()
+
+    def explain() -> str:
+        boxes.put(letter("r2"))
+        boxes.refuse("r1", "pose", "malformed", lambda: "no", 0)
+        return "no"
+
+    boxes.refuse("r1", "pose", "malformed", explain, 0)
+    mail, _ = boxes.drain(10, NOW_NS)
+    assert {each.robot for each in mail} == {"r1", "r2"}
+    (box,) = (each.boxes["pose"] for each in mail if each.robot == "r1")
+    assert box.refusals["malformed"].count == 2
+
+
+def test_a_fault_is_put_into_words_though_the_loop_came_between() -> None:
+    boxes, woken = Mailboxes(), []
+    boxes.attach(lambda: woken.append(1))
+
+    def explain() -> str:
+        assert boxes.drain(10, NOW_NS) == ([], None)
+        return "no"
+
+    boxes.refuse("r1", "pose", "malformed", explain, 0)
+    (mail,), _ = boxes.drain(10, NOW_NS)
+    refusal = mail.boxes["pose"].refusals["malformed"]
+    assert (refusal.count, refusal.text, woken) == (1, "no", [1])
+
+
+def test_tokens_under_many_names_lock_no_robot_out() -> None:
+    boxes = Mailboxes(max_robots=100)
+    for number in range(1000):
+        boxes.token(f"x{number}", "b0", True, 0)
+    for number in range(100):
+        boxes.put(letter(f"r{number}"))
+    mail, _ = boxes.drain(2000, NOW_NS)
+    assert {f"r{number}" for number in range(100)} <= {each.robot for each in mail}
+    assert boxes.turned_away == {mailbox.TOO_MANY_ROBOTS: 900}
+
+
+def test_the_end_of_a_token_is_heard_also_of_a_robot_that_gave_its_place_away() -> None:
+    boxes = Mailboxes(max_robots=1)
+    boxes.token("x1", "b0", True, 0)
+    boxes.drain(10, NOW_NS)
+    boxes.put(letter("r1"))
+    boxes.token("x1", "b0", False, 0)
+    boxes.token("x2", "b0", False, 0)
+    mail, _ = boxes.drain(10, NOW_NS)
+    assert [(each.robot, each.tokens) for each in mail] == [("x1", {"b0": False}), ("r1", {})]
+    assert boxes.turned_away == {mailbox.TOO_MANY_ROBOTS: 1}

@@ -8,6 +8,7 @@ from covista_service.station.ledger import (
     MAX_INTERVALS,
     Counts,
     Ledger,
+    Run,
     Sequences,
     Total,
 )
@@ -181,3 +182,35 @@ def test_of_a_closed_ledger_nothing_waits() -> None:
     ledger.hear([("b", 0), ("b", 2)], ("b", 2))
     ledger.close()
     assert ledger.counts() == Counts(received=2, replaced=1, missing=1, dropped={FORGOTTEN: 1})
+
+
+@given(st.lists(st.tuples(st.integers(0, 40), st.integers(1, 12))))
+def test_a_run_is_heard_as_its_numbers_are(runs: list[tuple[int, int]]) -> None:
+    at_once, one_by_one = Sequences(), Sequences()
+    for first, length in runs:
+        numbers = range(first, first + length)
+        assert at_once.add_run(first, first + length, length) == sum([one_by_one.add(number) for number in numbers])
+        assert at_once.missing == one_by_one.missing
+    assert all((number in at_once) is (number in one_by_one) for number in range(60))
+
+
+@given(st.sets(st.integers(0, 100), min_size=1), st.sets(st.integers(0, 100)))
+def test_of_a_run_with_gaps_the_count_stays_exact(given_up: set[int], named: set[int]) -> None:
+    ledger, named = Ledger(), named - given_up
+    ledger.give_up("overflow", [Run("b0", min(given_up), max(given_up) + 1, len(given_up))])
+    counts = ledger.counts()
+    assert counts.received + counts.missing == max(given_up) + 1
+    assert counts.dropped == {"overflow": len(given_up)}
+    later = {number for number in named if number > max(given_up)}
+    ledger.hear([("b0", number) for number in sorted(later)], None)
+    counts = ledger.counts()
+    assert counts.received + counts.missing == max(given_up | later) + 1
+    assert balanced(counts)
+
+
+def test_runs_without_end_take_no_more_room_and_stay_counted() -> None:
+    sequences, count = Sequences(), 3 * MAX_INTERVALS
+    for number in range(count):
+        assert sequences.add_run(3 * number, 3 * number + 2, 2) == 2
+    assert len(sequences._starts) <= MAX_INTERVALS
+    assert sequences.missing == count - 1
