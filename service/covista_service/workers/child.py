@@ -24,13 +24,22 @@ class Child:
     """A process that does one job at a time."""
 
     def __init__(self, arena: str | None) -> None:
-        """Start it, and go on while it loads compiled code; `arena` is where to find the features that are shared."""
+        """Start it, and go on while it loads compiled code; `arena` is where to find the features that are shared.
+
+        Raises OSError where no process can be started.
+        """
         spawn = get_context("spawn")
         self._line, theirs = spawn.Pipe()
         self._process = spawn.Process(target=_work, args=(theirs, arena), name="covista-worker", daemon=True)
-        self._process.start()
-        theirs.close()
+        try:
+            self._process.start()
+        except OSError:
+            self._line.close()
+            raise
+        finally:
+            theirs.close()
         self._shares: bool | None = None
+        self.ended = False
 
     @property
     def alive(self) -> bool:
@@ -58,6 +67,7 @@ class Child:
 
     def end(self) -> None:
         """End it, whatever it does: it holds nothing that would be left."""
+        self.ended = True
         self._process.kill()
         self._process.join(_END_S)
         self._line.close()

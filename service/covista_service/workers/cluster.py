@@ -38,7 +38,7 @@ class Cluster:
 
     While the scheduler is away or has no workers, `count` threads here do the jobs, and it is looked for again and
     again. A job that a worker died of is tried at another; where there is none, and where none answered in time, in a
-    process here, that nothing depends on.
+    process here, that nothing depends on. A worker that did not answer in time has no jobs until it does.
     """
 
     def __init__(self, scheduler: str, count: int, *, deadline_s: float = DEADLINE_S) -> None:
@@ -188,7 +188,9 @@ class Cluster:
             try:
                 return await connection.run(job, post)
             except OverdueError:
-                log.warning("worker %s did not answer within %g s", post.address, self._deadline_s)
+                why = f"did not answer within {self._deadline_s:g} s"
+                log.warning("worker %s %s", post.address, why)
+                connection.doubt(post, why)
                 self._tally.note("overdue")
                 self._tally.note("retried")
                 return await self._do_aside(job)

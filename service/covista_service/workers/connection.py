@@ -77,7 +77,7 @@ class Connection:
     @property
     def greeting(self) -> bool:
         """Are there workers that are not ready yet?"""
-        return bool(self._greeting)
+        return any(address not in self.unfit for address in self._greeting)
 
     def choose(self, tried: Collection[Post]) -> Post | None:
         """The worker with most room, but none of those that have been tried."""
@@ -88,6 +88,16 @@ class Connection:
         """Have a worker do a job. Raises what the job raises, or PostLostError, or OverdueError."""
         result: _T = unpacked(await self._perform(job, post, self._deadline_s))
         return result
+
+    def doubt(self, post: Post, why: str) -> None:
+        """Give no more jobs to a worker that did not answer, nor wait for those that it has, until it answers again."""
+        if self._present.get(post.address) is not post:
+            return
+        post.gone.set()
+        self.posts = tuple(one for one in self.posts if one is not post)
+        self.unfit = {**self.unfit, post.address: why}
+        again = self._present[post.address] = Post(post.address, post.slots)
+        self._greeting[post.address] = asyncio.create_task(self._greet_again(again))
 
     async def watch(self) -> str:
         """Keep to who is there, until the scheduler is not; why it is not."""
@@ -153,6 +163,20 @@ class Connection:
         if why is not None and not self.away:
             log.warning("worker %s %s", post.address, why)
             self.unfit = {**self.unfit, post.address: why}
+        self._greeting.pop(post.address, None)
+
+    async def _greet_again(self, post: Post) -> None:
+        """Wait until a worker that did not answer does, however long that takes."""
+        while self._present.get(post.address) is post:
+            try:
+                unpacked(await self._perform(loading(), post, LOADING_S))
+            except Exception:  # noqa: BLE001 - why it is not used is told already
+                await asyncio.sleep(_LOOK_S)
+                continue
+            log.info("worker %s answers again", post.address)
+            self.unfit = {other: why for other, why in self.unfit.items() if other != post.address}
+            self.posts = (*self.posts, post)
+            break
         self._greeting.pop(post.address, None)
 
     async def _unlike(self, address: str) -> str | None:

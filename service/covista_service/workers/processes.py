@@ -33,6 +33,7 @@ class Processes:
     """
 
     def __init__(self, count: int, *, deadline_s: float = DEADLINE_S, tally: Tally | None = None) -> None:
+        """Raises OSError where processes cannot be started."""
         self._count = count
         self._deadline_s = deadline_s
         self._tally = tally or Tally()
@@ -42,10 +43,15 @@ class Processes:
         self._shipped: Shipped[Slip] = Shipped()
         # As many as threads: whoever wants one finds one.
         self._living: list[Child] = []
-        self._idle = deque(self._child() for _ in range(count))
+        self._idle: deque[Child] = deque()
         self._threads = ThreadPoolExecutor(count, "covista-worker")
         self._under_way: set[Future[Any]] = set()
-        self._loading = [self._start(self._meet) for _ in range(count)]
+        try:
+            self._idle.extend(self._child() for _ in range(count))
+            self._loading = [self._start(self._meet) for _ in range(count)]
+        except BaseException:
+            self.close()
+            raise
 
     def submit(self, job: Job[_T]) -> Future[_T]:
         """Have a job done. Raises RuntimeError where the pool is closed."""
@@ -95,17 +101,19 @@ class Processes:
             if said is not None:
                 result: _T = unpacked(said)
                 return result
-            if left and not self._closing:
+            if self._closing:
+                raise JobLostError("the station ends")
+            if left:
                 self._tally.note("retried")
         self._tally.note("given_up")
         raise JobLostError(f"{TRIES} workers died of it, or did not return within {self._deadline_s:g} s")
 
     def _try(self, job: Job[_T], packed: bytes) -> bytes | None:
         """What the next process that is free says to a job, None if it did not live to say anything."""
-        child = self._idle.popleft()
+        child = self._next()
         try:
-            if not child.alive:
-                child = self._after(child)
+            if child.ended:
+                return None
             # Loading compiled code is not the job's time.
             place = self._shared if child.shares() else self._by_value
             features = [place(one) for one in job.features]
@@ -121,11 +129,31 @@ class Processes:
             self._idle.append(child)
         return None
 
+    def _next(self) -> Child:
+        """The next process that is free, an ended one where none lives and none can be started."""
+        child = self._idle.popleft()
+        for _ in range(self._count):
+            if not child.alive:
+                child = self._after(child)
+            if not child.ended:
+                break
+            self._idle.append(child)
+            child = self._idle.popleft()
+        return child
+
     def _after(self, child: Child) -> Child:
-        """Another process in the place of one that is of no use."""
-        self._tally.note("lost")
-        child.end()
-        return child if self._closing else self._child()
+        """Another process in the place of one that is of no use; that one, ended, where no other can be started."""
+        if not child.ended:
+            child.end()
+            if not self._closing:
+                self._tally.note("lost")
+        if self._closing:
+            return child
+        try:
+            return self._child()
+        except OSError as error:
+            log.warning("no worker can be started: %s", error)
+            return child
 
     def _child(self) -> Child:
         child = Child(None if self._arena is None else self._arena.path)

@@ -1,3 +1,5 @@
+import os
+import signal
 import socket
 import threading
 from collections.abc import Iterator
@@ -60,6 +62,28 @@ def test_the_death_of_one_costs_no_job(cluster: Cluster, tmp_path: Path) -> None
     after = cluster.status()
     assert (after.lost - before.lost, after.given_up) == (1, before.given_up)
     assert after.retried > before.retried
+
+
+def test_a_worker_that_hangs_has_no_jobs_until_it_answers(cluster: Cluster) -> None:
+    numbers = {cluster.submit(pid()).result(30)[0] for _ in range(4)} | pids(cluster, 20)
+    stopped, other = sorted(numbers)
+    os.kill(stopped, signal.SIGSTOP)
+    try:
+        assert all(job.exception(60) is None for job in [cluster.submit(pid()) for _ in range(8)])
+        assert "did not answer within 2 s" in str(wait_until(lambda: cluster.status().remark))
+        before = cluster.status()
+        assert pids(cluster, 20) == {other}
+        assert cluster.status() == before
+    finally:
+        os.kill(stopped, signal.SIGCONT)
+    wait_until(lambda: cluster.status().remark is None, "it answers again", 60)
+    assert cluster.status().capacity == before.capacity + 2
+    wait_until(lambda: pids(cluster, 20) == {stopped, other}, "both have jobs", 60)
+
+
+def pids(cluster: Cluster, count: int) -> set[int]:
+    """Who does so many jobs that come at once."""
+    return {job.result(30)[0] for job in [cluster.submit(pid()) for _ in range(count)]}
 
 
 def test_a_job_that_kills_whoever_touches_it_is_given_up(cluster: Cluster) -> None:

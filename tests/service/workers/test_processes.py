@@ -1,3 +1,4 @@
+import errno
 import os
 import signal
 import subprocess
@@ -10,7 +11,8 @@ from pathlib import Path
 import psutil
 import pytest
 from covista_service.perception.comparison import Outcome
-from covista_service.workers import JobLostError, Workers, WorkersOptions, load
+from covista_service.workers import JobLostError, Workers, WorkersOptions, load, processes
+from covista_service.workers.child import Child
 from covista_service.workers.processes import Processes
 
 from tests.service.deadline import wait_until
@@ -77,6 +79,62 @@ def test_one_that_died_while_idle_costs_no_job(pool: Processes) -> None:
     assert pool.status().lost - before.lost == 1
 
 
+def shared_memory() -> int:
+    """How many arenas this process holds."""
+    return sum("covista-features" in _target(link) for link in Path("/proc/self/fd").iterdir())
+
+
+def _target(link: Path) -> str:
+    try:
+        return os.readlink(link)
+    except OSError:
+        return ""
+
+
+class Starts:
+    """Starts processes as long as there is memory for them."""
+
+    def __init__(self, last: int) -> None:
+        self.left = last
+        self.children: list[Child] = []
+
+    def __call__(self, arena: str | None) -> Child:
+        if self.left == 0:
+            raise OSError(errno.ENOMEM, "no memory")
+        self.left -= 1
+        self.children.append(Child(arena))
+        return self.children[-1]
+
+
+@pytest.mark.usefixtures("pool")
+def test_where_processes_cannot_be_started_none_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    starts, arenas = Starts(1), shared_memory()
+    monkeypatch.setattr(processes, "Child", starts)
+    with pytest.raises(OSError, match="no memory"):
+        Processes(2)
+    assert not starts.children[0].alive
+    assert shared_memory() == arenas
+
+
+def test_while_no_other_can_be_started_jobs_go_to_those_that_live(monkeypatch: pytest.MonkeyPatch) -> None:
+    starts = Starts(2)
+    monkeypatch.setattr(processes, "Child", starts)
+    pool = Processes(2)
+    wait_until(lambda: pool.status().warm, "processes are warm", 60)
+    numbers = {pool.submit(pid()).result(60)[0] for _ in range(8)}
+    psutil.Process(numbers.pop()).kill()
+    assert {pool.submit(pid()).result(60)[0] for _ in range(4)} == numbers
+    (only,) = numbers
+    psutil.Process(only).kill()
+    with pytest.raises(JobLostError):
+        pool.submit(pid()).result(60)
+    assert (pool.status().lost, pool.status().given_up) == (2, 1)
+    starts.left = 2
+    assert len({pool.submit(pid()).result(60)[0] for _ in range(4)} - numbers) >= 1
+    assert pool.status().lost == 2
+    pool.close()
+
+
 @pytest.mark.parametrize("words", ["1 / 0", "__import__('threading').Lock()", "(_ for _ in ()).throw(EOFError())"])
 def test_errors_and_results_that_cannot_travel_come_back_as_errors(pool: Processes, words: str) -> None:
     before = pool.status()
@@ -109,6 +167,7 @@ def test_closing_ends_even_who_does_not_return() -> None:
     assert not psutil.pid_exists(number)
     assert all(job.done() for job in jobs)
     assert set(threading.enumerate()) == before
+    assert (pool.status().lost, pool.status().retried, pool.status().given_up) == (0, 0, 0)
     with pytest.raises(RuntimeError):
         pool.submit(pid())
 
