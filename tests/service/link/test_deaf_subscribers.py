@@ -1,10 +1,10 @@
 """Subscribers that are stopped, or that do not come back from their callback, in processes of their own."""
 
+import select
 import signal
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
@@ -37,10 +37,8 @@ with zenoh.open(config("client", connect=[sys.argv[1]])) as session:
     print("up", flush=True)
     threading.Event().wait()
 """
-# Enough to fill whatever lies between two processes.
-EVENTS, TEXT_BYTES, AT_A_TIME = 1500, 20_000, 10
-# Zenoh would wait five seconds for a link that does not move.
-SOON_S = 4.0
+# Enough to fill whatever lies between two processes, several times.
+EVENTS, TEXT_BYTES, AT_A_TIME = 3000, 50_000, 10
 
 
 @contextmanager
@@ -58,6 +56,11 @@ def listener(air: Air) -> Iterator[subprocess.Popen[str]]:
 def said(process: subprocess.Popen[str]) -> str:
     assert process.stdout is not None
     return process.stdout.readline().strip()
+
+
+def said_no_more(process: subprocess.Popen[str]) -> bool:
+    assert process.stdout is not None
+    return not select.select([process.stdout], [], [], 0)[0]
 
 
 def news(first: int) -> News:
@@ -97,15 +100,14 @@ def test_who_does_not_listen_costs_the_others_nothing(air: Air, stopped: bool) -
         wait_until(lambda: len(heard) == AT_A_TIME)
         if stopped:
             deaf.send_signal(signal.SIGSTOP)
-        longest_s = 0.0
         for first in range(AT_A_TIME, EVENTS, AT_A_TIME):
-            began_s = time.monotonic()
             publisher.take(news(first))
             wait_until(lambda last=first + AT_A_TIME - 1: heard[-1] == last, "the last event")
-            longest_s = max(longest_s, time.monotonic() - began_s)
-        assert longest_s < SOON_S
+        assert said_no_more(deaf)
+        # Zenoh waits five seconds for a link that does not move, all others with it, and then cuts it.
+        assert stopped or len(air.station.info.transports()) == 2
         grown_bytes = psutil.Process().memory_info().rss - before_bytes
         publisher.close()
     assert heard == list(range(EVENTS))
-    assert grown_bytes < EVENTS * TEXT_BYTES / 2
+    assert grown_bytes < EVENTS * TEXT_BYTES / 3
     assert not [thread for thread in threading.enumerate() if thread.name == "covista-publish"]

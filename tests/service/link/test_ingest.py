@@ -25,6 +25,8 @@ from tests.service.link.conftest import Air
 from tests.service.wall import keyframe_bytes, pose_bytes
 
 SITE = "ingest"
+# Zenoh drops what it has no room for, unless told otherwise.
+BLOCK = zenoh.CongestionControl.BLOCK
 
 
 class Heard:
@@ -70,7 +72,7 @@ def test_keyframes_and_poses_come_in_with_their_arrival(air: Air, heard: Heard) 
 
 def test_every_message_of_a_burst_is_named_once(air: Air, heard: Heard) -> None:
     for sequence in range(300):
-        air.rover.put(keys.pose(SITE, "r1"), pose_bytes("r1", sequence=sequence))
+        air.rover.put(keys.pose(SITE, "r1"), pose_bytes("r1", sequence=sequence), congestion_control=BLOCK)
 
     def named() -> list[tuple[str, int]]:
         received = [event for event in heard.of(MessagesReceived) if isinstance(event, MessagesReceived)]
@@ -104,7 +106,7 @@ def test_beside_a_busy_thread_a_flood_is_named_to_the_last_message(air: Air, hea
     busy = threading.Thread(target=lambda: [sum(range(1000)) for _ in iter(over.is_set, True)])
     busy.start()
     publisher = air.rover.declare_publisher(
-        keys.pose(SITE, "r1"), congestion_control=zenoh.CongestionControl.BLOCK, encoding=codec.POSE_ENCODING
+        keys.pose(SITE, "r1"), congestion_control=BLOCK, encoding=codec.POSE_ENCODING
     )
     try:
         for sequence in range(count):
@@ -131,8 +133,8 @@ def test_a_flood_of_garbage_is_counted_by_reason_and_the_robot_s_own_come_throug
     kinds = (b"\xff\xff garbage", pose_bytes("r2"), pose_bytes("r1") + b"\xfa\x3e\xff\x7f" + bytes(16_383))
     for turn in range(100):
         for payload in kinds:
-            air.rover.put(keys.pose(SITE, "r1"), payload, congestion_control=zenoh.CongestionControl.BLOCK)
-        air.rover.put(keys.pose(SITE, "r1"), pose_bytes("r1", sequence=turn))
+            air.rover.put(keys.pose(SITE, "r1"), payload, congestion_control=BLOCK)
+        air.rover.put(keys.pose(SITE, "r1"), pose_bytes("r1", sequence=turn), congestion_control=BLOCK)
     dropped: Counter[str] = Counter()
     heard_of: set[int] = set()
 
