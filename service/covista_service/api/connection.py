@@ -20,8 +20,8 @@ from covista_service.api.errors import refuse
 # What the system keeps unsent for a client: bounds what hundreds cost, and lets a slow one be seen to move.
 _SEND_BUFFER_BYTES = 128 * 1024
 SILENT, CROWD = "silent", "crowd"
-# Whoever asks whether the station works should hear it, however many others there are.
-_ALWAYS = ("/healthz", "/readyz")
+# Whoever asks whether the station works, and why not, should hear it, however many others there are.
+_ALWAYS = ("/healthz", "/readyz", "/metrics")
 
 
 @dataclass(frozen=True, slots=True)

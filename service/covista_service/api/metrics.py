@@ -103,10 +103,10 @@ def _crew(crew: CrewStatus) -> Iterator[Metric]:
     yield _gauge("covista_workers_warm", "Is compiled code loaded where jobs run?", {crew.kind: crew.warm}, "kind")
     fallback = {crew.kind: crew.fallback is not None}
     yield _gauge("covista_workers_fallback", "Do jobs run here, since they cannot where they should?", fallback, "kind")
-    yield _counter("covista_workers_lost", "Workers that died.", crew.lost)
+    yield _counter("covista_workers_lost", "Workers that died, left, or were ended.", crew.lost)
     yield _counter("covista_jobs_retried", "Jobs done again, since a worker died or did not answer.", crew.retried)
     yield _counter("covista_jobs_overdue", "Jobs that a worker did not return from in time.", crew.overdue)
-    yield _counter("covista_jobs_given_up", "Jobs that failed, since two workers died of them.", crew.given_up)
+    yield _counter("covista_jobs_given_up", "Jobs that two workers died of or did not return from.", crew.given_up)
     yield _counter("covista_features_shipped_bytes", "Features that were sent to workers.", crew.shipped_bytes)
     yield _counter("covista_features_shipped_again", "Keyframes whose features were lost there.", crew.shipped_again)
 

@@ -25,7 +25,7 @@ TOO_FAST = "came faster than the station could take it"
 MAX_ROBOTS = 4096
 # Waiting payloads of all robots, in all.
 MAX_BYTES = 256 * 1024 * 1024
-# Names of messages, and boots of tokens, that a robot may have waiting; beyond, messages are surplus and tokens not heard.
+# Names of messages, and boots of tokens, that a robot may have waiting; beyond, messages are given up.
 MAX_NAMES = 16_384
 MAX_TOKENS = 64
 

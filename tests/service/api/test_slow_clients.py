@@ -164,7 +164,7 @@ def test_one_too_many_hears_so_and_health_is_told_all_the_same(desk: Desk, stack
     assert (refused.status_code, refused.headers["retry-after"]) == (503, "10")
     assert refused.headers["content-type"] == "application/problem+json"
     assert json.loads(refused.content)["title"] == "Too many connections"
-    assert site.get("/healthz").status_code == 200
+    assert [site.get(path).status_code for path in ("/healthz", "/readyz", "/metrics")] == [200] * 3
     for _ in range(4):
         stack.enter_context(closing(site.ask()))
     wait_until(lambda: site.given_up["crowd"] >= 2)

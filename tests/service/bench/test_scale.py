@@ -39,7 +39,7 @@ def test_work_is_counted_by_keyframe_and_regrouping_apart() -> None:
     ("surveys", "cpu_s", "holds"),
     [(40, 1.0, (True, True)), (47, 1.9, (True, True)), (49, 2.1, (False, False)), (31, 0.1, (False, True))],
 )
-def test_the_largest_swarm_is_heldagainst_the_smallest(surveys: int, cpu_s: float, holds: tuple[bool, bool]) -> None:
+def test_the_largest_swarm_is_held_against_the_smallest(surveys: int, cpu_s: float, holds: tuple[bool, bool]) -> None:
     found = list(against(size(1000, surveys, cpu_s), size(50, 40, 1.0)))
     assert [row.case for row in found] == ["surveys", "cpu"]
     assert tuple(row.holds for row in found) == holds
