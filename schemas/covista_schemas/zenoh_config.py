@@ -12,10 +12,9 @@ from typing import Literal
 
 import zenoh
 
-from covista_schemas.codec import MAX_KEYFRAME_BYTES
 from covista_schemas.errors import LinkError
 
-MAX_MESSAGE_BYTES = MAX_KEYFRAME_BYTES
+MAX_MESSAGE_BYTES = 4 * 1024 * 1024
 # A dead link is noticed after some 1.6 s, not 10 s.
 LEASE_MS = 2000
 # How often a router that does not answer is tried: soon at first, once a second in the end.

@@ -30,7 +30,7 @@ from covista_service.station.station import Station
 from covista_service.store.database import check_url
 from covista_service.store.history import History
 from covista_service.telemetry import Telemetry, about
-from covista_service.workers import Workers, WorkersOptions, check_kind
+from covista_service.workers import Workers, WorkersOptions, check_kind, daemon
 
 log = logging.getLogger(__name__)
 
@@ -109,7 +109,7 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
 async def _run(loop: Loop) -> None:
     """Run the loop once it can group: where code has to be compiled first, everybody else must not wait for it."""
     try:
-        await asyncio.to_thread(warm_up)
+        await asyncio.wrap_future(daemon.start(warm_up, "covista-loading-groups"))
     except Exception:
         log.warning("compiled code could not be loaded ahead; the first groups will wait for it", exc_info=True)
     await loop.run()

@@ -64,6 +64,19 @@ def serving(folder: Path, *flags: str, **variables: str) -> Iterator[tuple[subpr
             process.wait()
 
 
+@pytest.mark.parametrize("workers", ["threads", "processes"])
+def test_a_signal_ends_it_soon_while_code_is_compiled(tmp_path: Path, workers: str) -> None:
+    """That takes half a minute where nothing is on disk yet."""
+    cache = str(tmp_path / "cache")
+    with serving(tmp_path, "--workers", workers, NUMBA_CACHE_DIR=cache) as (process, url):
+        assert httpx.get(f"{url}/readyz").json()["status"] == "starting"
+        family = psutil.Process(process.pid).children(recursive=True)
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(10) == 0
+        _, alive = psutil.wait_procs(family, timeout=5)
+        assert not alive
+
+
 @pytest.mark.parametrize(("workers", "number"), [("threads", signal.SIGTERM), ("processes", signal.SIGINT)])
 def test_a_signal_ends_it_soon_with_0_and_nothing_left(tmp_path: Path, workers: str, number: signal.Signals) -> None:
     with serving(tmp_path, "--workers", workers) as (process, url):

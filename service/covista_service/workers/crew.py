@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
@@ -13,7 +13,7 @@ from covista_service.perception.comparison import Comparison
 from covista_service.perception.scene import SceneOptions
 from covista_service.perception.warming import warm_up
 from covista_service.station.events import BuildSurfaces, Keyframe, SurveyPair
-from covista_service.workers import jobs
+from covista_service.workers import daemon, jobs
 from covista_service.workers.cluster import Cluster
 from covista_service.workers.jobs import Job
 from covista_service.workers.pool import Pool, cancelled
@@ -48,8 +48,7 @@ class Workers:
         self._closed = False
         self._pool = _pool(options)
         # Overlaps are read in this process. Now is better than when the first robot waits.
-        self._loading = ThreadPoolExecutor(1, "covista-loading")
-        self._loaded = self._loading.submit(warm_up)
+        self._loaded = daemon.start(warm_up, "covista-loading")
         self._loaded.add_done_callback(_tell_failure)
 
     @property
@@ -91,7 +90,6 @@ class Workers:
         """Let jobs under way end, and drop those that wait."""
         with self._lock:
             self._closed = True
-        self._loading.shutdown(wait=True, cancel_futures=True)
         self._pool.close()
 
 
