@@ -21,6 +21,7 @@ __all__ = ["LoadError", "free_endpoint", "rows", "under_load"]
 MARKS_MS = {"p50": (0.5, 100.0), "p99": (0.99, 500.0)}
 PEER = "OpenCV BFMatcher.knnMatch of one pair, both directions"
 _SECONDS, _LONG_SECONDS = 20.0, 120.0
+_RATE_HZ = 1.0
 _PARTS = 4
 
 
@@ -29,8 +30,9 @@ def rows(long: bool) -> Iterator[Row]:
 
     The spread is that of quarters of the time. One pair of descriptors matched is the least that could be waited for.
     """
-    options = LoadOptions(free_endpoint(), _LONG_SECONDS if long else _SECONDS)
-    windows, all_counted = under_load(options)
+    options = LoadOptions(free_endpoint())
+    seconds = (_LONG_SECONDS if long else _SECONDS) / _PARTS
+    windows, all_counted = under_load(options, March(_RATE_HZ, _RATE_HZ, seconds))
     matched_ms = median(brute_force_ms(load.stock(options.robots, options.features)))
     whole = replace(windows[0], latencies_ms=tuple(each for window in windows for each in window.latencies_ms))
     for case, (share, mark_ms) in MARKS_MS.items():
@@ -48,15 +50,13 @@ def rows(long: bool) -> Iterator[Row]:
         )
 
 
-def under_load(options: LoadOptions) -> tuple[list[Window], bool]:
+def under_load(options: LoadOptions, quarter: March) -> tuple[list[Window], bool]:
     """What a station did under a load, by quarters of the time; and was every keyframe sent received or missed?"""
-    rate_hz = 1 / options.period_s
-    plan = March(rate_hz, rate_hz, options.seconds / _PARTS)
     windows: list[Window] = []
     sent = Sent(0, 0, 0.0)
     with rig(options) as running:
         for _ in range(_PARTS):
-            window, sent = running.window(plan, sent)
+            window, sent = running.window(quarter, sent)
             windows.append(window)
         running.settle()
         # Those of the last moment.

@@ -23,15 +23,10 @@ PREFIX = "b"
 
 @dataclass(frozen=True, slots=True)
 class LoadOptions:
-    """Each of `robots` sends a keyframe of `features` features and a pose, every `period_s`, for `seconds`.
-
-    A `March` that is sent instead of a word says otherwise.
-    """
+    """`robots` send keyframes of `features` features, and poses; how often and for how long says each `March`."""
 
     connect: str
-    seconds: float
     robots: int = 20
-    period_s: float = 1.0
     features: int = 500
 
 
@@ -42,11 +37,15 @@ class Prepared:
 
 @dataclass(frozen=True, slots=True)
 class Sent:
-    """Said when the last keyframe of a march is out: counts since the beginning, and how late the march was at most."""
+    """Said when the last keyframe of a march is out: counts since the beginning, and how late the march was at most.
+
+    `skipped` were too late to be sent.
+    """
 
     keyframes: int
     poses: int
     behind_s: float
+    skipped: int = 0
 
 
 @cache
@@ -59,15 +58,15 @@ def stock(robots: int, features: int) -> Stock:
 
 
 def play(line: Line, options: LoadOptions, ready: Stock | None = None) -> None:
-    """Make keyframes, unless they are `ready`, and send at each word from the parent; leave when the line closes.
+    """Make keyframes, unless they are `ready`, and march as the parent says; leave when the line closes.
 
-    Robots connect at the first word. `Sent` is said after each.
+    Robots connect before the first march. `Sent` is said after each.
     """
     crowd = Crowd(ready or stock(options.robots, options.features), options.robots, prefix=PREFIX)
     line.send(Prepared())
     orders: SimpleQueue[March | None] = SimpleQueue()
     gone = threading.Event()
-    listener = threading.Thread(target=_listen, args=(line, options, orders, gone), name="orders", daemon=True)
+    listener = threading.Thread(target=_listen, args=(line, orders, gone), name="orders", daemon=True)
     listener.start()
     order = orders.get()
     if order is None:
@@ -82,14 +81,14 @@ def play(line: Line, options: LoadOptions, ready: Stock | None = None) -> None:
             step += round((order.seconds or 0.0) * order.rate_hz)
             total.keyframes += progress.keyframes
             total.poses += progress.poses
-            line.send(Sent(total.keyframes, total.poses, progress.most_behind_s))
+            total.skipped += progress.skipped
+            line.send(Sent(total.keyframes, total.poses, progress.most_behind_s, total.skipped))
             order = orders.get()
 
 
-def _listen(line: Line, options: LoadOptions, orders: SimpleQueue[March | None], gone: threading.Event) -> None:
-    usual = March(1 / options.period_s, 1 / options.period_s, options.seconds)
+def _listen(line: Line, orders: SimpleQueue[March | None], gone: threading.Event) -> None:
     while (order := line.receive()) is not None:
-        orders.put(order if isinstance(order, March) else usual)
+        orders.put(order)
     end_soon()
     gone.set()
     orders.put(None)

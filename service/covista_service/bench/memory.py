@@ -59,7 +59,7 @@ def rows(long: bool) -> Iterator[Row]:
 
 def _per_robot(long: bool) -> Row:
     robots = LONG_ROBOTS if long else ROBOTS
-    with rig(LoadOptions(free_endpoint(), 0.0, robots=robots, features=_FEATURES)) as running:
+    with rig(LoadOptions(free_endpoint(), robots=robots, features=_FEATURES)) as running:
         empty_mb, full_mb = filled(running, robots, _LONG_SETTLE_S if long else _SETTLE_S)
     each_mb = (full_mb - empty_mb) / robots
     return _row("per_robot", each_mb, None, "MB", f"<= {MOST_PER_ROBOT_MB:g} MB", holds=each_mb <= MOST_PER_ROBOT_MB)
@@ -74,7 +74,7 @@ def filled(running: Rig, robots: int, settle_s: float) -> tuple[float, float]:
 
 
 def _slope(long: bool) -> Row:
-    with rig(LoadOptions(free_endpoint(), 0.0, robots=_STEADY_ROBOTS, features=_FEATURES)) as running:
+    with rig(LoadOptions(free_endpoint(), robots=_STEADY_ROBOTS, features=_FEATURES)) as running:
         trend = trend_of(observed(running, _LONG_STEADY_S if long else _STEADY_S))
     mark = f"0 within the interval, or <= {100 * FLAT_SHARE:g} % in all"
     return _row("slope", trend.slope, trend.margin, "MB/h", mark, holds=trend.flat)

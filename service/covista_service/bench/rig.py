@@ -42,8 +42,9 @@ class LoadError(CovistaError):
 class Window:
     """What a station did in a stretch of time, `seconds` long, and what was sent to it meanwhile.
 
-    `sweeps` are those of the surveys that were tried once in a while, of pairs that are not likely to meet. Latencies
-    run from a keyframe's arrival to the first groups evaluated with a survey of it.
+    `skipped` messages were too late to be sent. `sweeps` are those of the surveys that were tried once in a while, of
+    pairs that are not likely to meet. Latencies run from a keyframe's arrival to the first groups evaluated with a
+    survey of it.
     """
 
     seconds: float
@@ -56,6 +57,7 @@ class Window:
     regrouping_s: float
     latencies_ms: tuple[float, ...]
     turns_ms: tuple[float, ...]
+    skipped: int = 0
 
     def latency_ms(self, share: float) -> float:
         """The latency that a share of the keyframes does not exceed. Raises LoadError."""
@@ -117,6 +119,7 @@ class Rig:
             regrouping_s=after.regrouping_s - before.regrouping_s,
             latencies_ms=tuple(latency_ms for _, latency_ms in after.latencies_ms),
             turns_ms=after.turns_ms,
+            skipped=done.skipped - sent.skipped,
         ), done
 
     def settle(self, timeout_s: float = _DRAIN_S) -> bool:

@@ -90,7 +90,7 @@ def rows(long: bool) -> Iterator[Row]:
 
 def measured(robots: int, *, long: bool) -> Size:
     """Load a station with so many robots."""
-    with rig(LoadOptions(free_endpoint(), 0.0, robots=robots, features=_FEATURES)) as running:
+    with rig(LoadOptions(free_endpoint(), robots=robots, features=_FEATURES)) as running:
         return measure(
             running,
             robots,

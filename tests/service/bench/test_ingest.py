@@ -1,3 +1,4 @@
+from collections import Counter
 from collections.abc import Iterator
 
 import pytest
@@ -9,6 +10,8 @@ from covista_service.bench import flood, ingest
 from covista_service.demo import children
 
 from tests.service.deadline import free_endpoint
+
+SHORT = {codec.MALFORMED, codec.WRONG_ID, codec.BAD_POSE}
 
 
 @pytest.fixture(scope="module")
@@ -30,16 +33,35 @@ def test_a_flood_of_poses_is_of_good_poses_numbered_one_by_one(session: zenoh.Se
 
 
 def test_none_of_the_garbage_is_any_good_and_all_kinds_are_there(session: zenoh.Session) -> None:
-    make = flood.garbage(session, 2)
-    codes = set()
+    # Noise is of two kinds: poses and keyframes.
+    assert faults(flood.garbage(session, 2)) == dict.fromkeys(SHORT | {codec.TOO_LARGE}, 100) | {codec.MALFORMED: 200}
+    assert faults(flood.garbage_short(session, 2)) == dict.fromkeys(SHORT, 125) | {codec.MALFORMED: 250}
+    assert faults(flood.garbage_long(session, 2)) == {codec.TOO_LARGE: 500}
+
+
+def faults(make: flood.Make) -> Counter[str]:
+    """What is wrong with five hundred messages."""
+    codes: Counter[str] = Counter()
     for number in range(500):
         key, data = make(number)
         robot = keys.parse_robot_key(str(key)).robot
         decode = codec.decode_pose if str(key).endswith("pose") else codec.decode_keyframe
         with pytest.raises(DecodeError) as refused:
             decode(data, robot=robot)
-        codes.add(refused.value.code)
-    assert codes == {codec.MALFORMED, codec.WRONG_ID, codec.BAD_POSE, codec.TOO_LARGE}
+        codes[refused.value.code] += 1
+    return codes
+
+
+def test_a_flood_of_keyframes_is_of_good_keyframes_numbered_one_by_one(session: zenoh.Session) -> None:
+    make = flood.keyframes(session, 2)
+    seen = []
+    for number in range(6):
+        key, data = make(number)
+        keyframe = codec.decode_keyframe(data, robot=keys.parse_robot_key(str(key)).robot)
+        assert keyframe.features is not None
+        assert 60_000 < len(data) < 80_000
+        seen.append((keyframe.robot, keyframe.sequence))
+    assert seen == [("k1", 0), ("k2", 0), ("k1", 1), ("k2", 1), ("k1", 2), ("k2", 2)]
 
 
 def test_every_message_of_a_flood_is_accounted_for() -> None:
@@ -69,6 +91,8 @@ def test_a_flood_ends_with_its_parent() -> None:
         assert flooder.process.returncode is not None
 
 
-def test_what_a_message_costs_is_told_where_the_system_tells() -> None:
-    for cost_us in ingest.costs_us(1.0, 2000):
-        assert cost_us is None or 0 <= cost_us < 1000
+def test_what_a_message_costs_is_told_kind_by_kind() -> None:
+    costs_us = ingest.costs_us(1.0, {"poses": 2000, "garbage_short": 2000, "keyframes": 20, "garbage_long": 500})
+    assert set(costs_us) == {"poses", "garbage_short", "keyframes", "garbage_long"}
+    assert all(cost_us >= 0 for cost_us in costs_us.values())
+    assert costs_us["keyframes"] > 0

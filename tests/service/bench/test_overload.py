@@ -3,7 +3,8 @@ from __future__ import annotations
 import pytest
 from covista_schemas.reports import Counters, RobotReport
 from covista_service.bench.load import Sent
-from covista_service.bench.overload import astray, recovery_s
+from covista_service.bench.overload import SHORT, Ordeal, astray, recovery_s, rows_of
+from covista_service.bench.prober import Answers
 
 from tests.clients.ground import report_on
 
@@ -58,3 +59,12 @@ def test_what_is_on_an_account_is_not_astray() -> None:
 )
 def test_what_has_no_fate_or_never_came_is_astray(keyframes: Counters, poses: Counters, expected: int) -> None:
     assert astray([report(keyframes, poses)], Sent(10, 10, 0.0)) == expected
+
+
+@pytest.mark.parametrize(("sent_per_s", "holds"), [(200.0, True), (180.0, True), (170.0, False), (40.0, False)])
+def test_an_overload_that_was_none_shows_nothing(sent_per_s: float, holds: bool) -> None:
+    answers = Answers((10.0, 20.0), 0)
+    found = Ordeal(40.0, sent_per_s, answers, answers, None, 0, 0, 1.0)
+    rows = {row.case: row for row in rows_of(found, SHORT)}
+    assert rows["sent"].holds is holds
+    assert (rows["recovery"].median, rows["recovery"].holds) == (SHORT.after_s, False)
