@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from dataclasses import dataclass, replace
@@ -19,6 +20,9 @@ from covista_service.demo.children import Line, end_soon
 
 SITE = "default"
 PREFIX = "b"
+
+# Of a number of turns, in floating point.
+_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,11 +78,12 @@ def play(line: Line, options: LoadOptions, ready: Stock | None = None) -> None:
     with antenna(options.connect, SITE, crowd.names, gone) as raised:
         if raised is None or not raised.await_heard(gone):
             return
-        total, step = Progress(), 0
+        total, turns = Progress(), 0
         while order is not None:
-            order = replace(order, first_step=step)
+            order = replace(order, first_step=turns / crowd.robots)
             progress = march(crowd, raised, order, RealTime(gone, GRAIN_S), time.time_ns())
-            step += round((order.seconds or 0.0) * order.rate_hz)
+            # A march that is over before everybody's turn leaves the rest to the next one.
+            turns += math.ceil((order.seconds or 0.0) * order.rate_hz * crowd.robots - _ROUNDING)
             total.keyframes += progress.keyframes
             total.poses += progress.poses
             total.skipped += progress.skipped
