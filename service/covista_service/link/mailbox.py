@@ -31,14 +31,16 @@ MAX_TOKENS = 64
 
 Explain = Callable[[], str]
 # What a robot stands in line for; in this order its mail is handed over.
-Line = Literal["token", "keyframe", "pose"]
-LINES: tuple[Line, ...] = ("token", "keyframe", "pose")
+Line = Literal["token", "keyframe", "pose", "garbage"]
+LINES: tuple[Line, ...] = ("token", "keyframe", "pose", "garbage")
 _MS = 1_000_000
 # A keyframe costs the loop up to a millisecond, a pose some hundredths to tenths of one.
 PACES: Mapping[Line, Pace] = {
     "token": Pace(20 * _MS),
     "keyframe": Pace(50 * _MS),
     "pose": Pace(20 * _MS, per_s=2000, burst=256),
+    # To hear twice a second why a robot cannot be understood is enough.
+    "garbage": Pace(500 * _MS),
 }
 
 
@@ -119,11 +121,15 @@ class Box:
 
 @dataclass(slots=True, eq=False)
 class Mail:
-    """What one robot sent since the last drain; `tokens` says by boot whether its liveliness token is there."""
+    """What one robot sent since the last drain; `tokens` says by boot whether its liveliness token is there.
+
+    What has no readable name is `garbage`, and waits by itself: it is in less of a hurry.
+    """
 
     robot: str
     boxes: dict[Topic, Box] = field(default_factory=dict)
     tokens: dict[str, bool] = field(default_factory=dict)
+    garbage: dict[Topic, Box] = field(default_factory=dict)
 
 
 class Mailboxes:
@@ -186,7 +192,10 @@ class Mailboxes:
         # Nobody else waits while the first of a burst is put into words.
         text = explain()
         with self._lock:
-            box, sooner = self._box(self._mail_of(robot), topic, arrived_ns)
+            mail = self._mail_of(robot)
+            sooner = not mail.garbage and self._stand("garbage", robot, arrived_ns)
+            box = mail.garbage.setdefault(topic, Box())
+            box.arrived_ns = arrived_ns
             box.refuse(code, text)
         if sooner:
             self._wake()
@@ -240,7 +249,7 @@ class Mailboxes:
     def _refuse_likewise(self, robot: str, topic: Topic, code: str, arrived_ns: int) -> bool:
         """Count a message whose fault has been put into words since the last drain; False if it has not."""
         mail = self._mail.get(robot)
-        box = mail.boxes.get(topic) if mail is not None else None
+        box = mail.garbage.get(topic) if mail is not None else None
         refusal = box.refusals.get(code) if box is not None else None
         if box is None or refusal is None:
             return False
@@ -286,10 +295,12 @@ class Mailboxes:
     def _hand_over(self, line: Line, mail: Mail, handed: Mail) -> None:
         if line == "token":
             handed.tokens, mail.tokens = mail.tokens, {}
+        elif line == "garbage":
+            handed.garbage, mail.garbage = mail.garbage, {}
         else:
             box = handed.boxes[line] = mail.boxes.pop(line)
             self._bytes -= _weight(box.kept)
-        if not mail.boxes and not mail.tokens:
+        if not mail.boxes and not mail.tokens and not mail.garbage:
             del self._mail[mail.robot]
 
 

@@ -36,6 +36,8 @@ def events_of(mail: Mail) -> Iterator[Event]:
     """What a robot's mail means, in the order in which the station should hear it."""
     for boot, alive in mail.tokens.items():
         yield TokenSeen(mail.robot, boot) if alive else TokenLost(mail.robot, boot)
+    for topic, box in mail.garbage.items():
+        yield from _accounts(mail.robot, topic, box)
     for topic, box in mail.boxes.items():
         yield from _accounts(mail.robot, topic, box)
         if box.kept is not None:

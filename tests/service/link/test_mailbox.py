@@ -202,7 +202,7 @@ def test_only_the_first_refusal_of_a_burst_is_put_into_words() -> None:
     for _ in range(100):
         boxes.refuse("r1", "pose", "malformed", explain, 0)
     (mail,), _ = boxes.drain(1, NOW_NS)
-    refusal = mail.boxes["pose"].refusals["malformed"]
+    refusal = mail.garbage["pose"].refusals["malformed"]
     assert (refusal.count, refusal.text, len(asked)) == (100, "no", 1)
 
 
@@ -215,8 +215,21 @@ def test_garbage_under_many_names_takes_no_places_from_robots() -> None:
     mail, _ = boxes.drain(2000, NOW_NS)
     robots = {each.robot for each in mail}
     assert {f"r{number}" for number in range(20)} <= robots
-    counted = sum(box.refusals["malformed"].count for each in mail for box in each.boxes.values() if box.refusals)
+    counted = sum(box.refusals["malformed"].count for each in mail for box in each.garbage.values())
     assert counted + boxes.turned_away[mailbox.UNKNOWN_ROBOT] == 1000
+
+
+def test_garbage_is_heard_of_twice_a_second_and_holds_up_nothing_readable() -> None:
+    boxes, heard, used = Mailboxes(), 0, 0
+    for step in range(40):
+        now_ns = NOW_NS + step * GAP_NS
+        boxes.refuse("r1", "keyframe", "malformed", lambda: "no", now_ns)
+        boxes.put(letter("r1", step, arrived_ns=now_ns))
+        for mail in boxes.drain(10, now_ns)[0]:
+            heard += "keyframe" in mail.garbage
+            used += "keyframe" in mail.boxes
+    # 40 gaps of 50 ms are two seconds.
+    assert (heard, used) == (4, 40)
 
 
 def test_waiting_payloads_are_bounded_in_all_and_given_back() -> None:
@@ -315,7 +328,7 @@ def test_while_a_fault_is_put_into_words_others_are_served_and_all_is_counted() 
     boxes.refuse("r1", "pose", "malformed", explain, 0)
     mail, _ = boxes.drain(10, NOW_NS)
     assert {each.robot for each in mail} == {"r1", "r2"}
-    (box,) = (each.boxes["pose"] for each in mail if each.robot == "r1")
+    (box,) = (each.garbage["pose"] for each in mail if each.robot == "r1")
     assert box.refusals["malformed"].count == 2
 
 
@@ -329,7 +342,7 @@ def test_a_fault_is_put_into_words_though_the_loop_came_between() -> None:
 
     boxes.refuse("r1", "pose", "malformed", explain, 0)
     (mail,), _ = boxes.drain(10, NOW_NS)
-    refusal = mail.boxes["pose"].refusals["malformed"]
+    refusal = mail.garbage["pose"].refusals["malformed"]
     assert (refusal.count, refusal.text, woken) == (1, "no", [1])
 
 
