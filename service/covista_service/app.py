@@ -71,9 +71,10 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
         close_later(publisher.close)
         history = await asyncio.to_thread(History, settings.database)
         close_later(history.close)
-        workers = await asyncio.to_thread(Workers, WorkersOptions(settings.workers, settings.workers_count))
-        close_later(workers.close)
         telemetry = Telemetry()
+        options = WorkersOptions(settings.workers, settings.workers_count)
+        workers = await asyncio.to_thread(Workers, options, telemetry.took)
+        close_later(workers.close)
         loop = Loop(
             Station(_station_options(settings, workers.capacity, history.last.revision)),
             Inbox(mailboxes),

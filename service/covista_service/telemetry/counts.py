@@ -62,6 +62,9 @@ class Telemetry:
         self._job_s = self._time(
             "covista_job_seconds", "From handing a job to the workers to its end, waiting included.", _JOBS_S, "kind"
         )
+        self._work_s = self._time(
+            "covista_work_seconds", "How long a job took where it was done, without waiting.", _JOBS_S, "kind"
+        )
         # What has not happened yet is 0 and not absent, so that its first time shows as an increase.
         for outcome in (*Outcome, WORKER_FAILED):
             self._surveys.labels(str(outcome))
@@ -70,6 +73,7 @@ class Telemetry:
         for kind in _JOBS:
             self._jobs.labels(kind)
             self._job_s.labels(kind)
+            self._work_s.labels(kind)
         self._latency = self._time(
             "covista_keyframe_to_groups_seconds",
             "From a keyframe's arrival to the first groups evaluated with a survey of it.",
@@ -97,6 +101,10 @@ class Telemetry:
     def worked(self, kind: JobKind, seconds: float) -> None:
         """A job is over, so long after it was handed over; from any thread."""
         self._job_s.labels(kind).observe(max(0.0, seconds))
+
+    def took(self, kind: JobKind, seconds: float) -> None:
+        """A job took so long where it was done; from any thread."""
+        self._work_s.labels(kind).observe(seconds)
 
     def ended(self, kind: JobKind) -> None:
         """What became of a job is taken in."""

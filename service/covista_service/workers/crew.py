@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
+from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
@@ -13,6 +14,7 @@ from covista_service.perception.comparison import Comparison
 from covista_service.perception.scene import SceneOptions
 from covista_service.perception.warming import warm_up
 from covista_service.station.events import BuildSurfaces, Keyframe, SurveyPair
+from covista_service.telemetry import JobKind
 from covista_service.workers import daemon, jobs
 from covista_service.workers.cluster import Cluster
 from covista_service.workers.jobs import Job
@@ -22,6 +24,8 @@ from covista_service.workers.scheduler import check_kind, scheduler_of
 from covista_service.workers.threads import Threads
 
 _T = TypeVar("_T")
+# How many seconds a job took where it was done.
+Took = Callable[[JobKind, float], None]
 
 log = logging.getLogger(__name__)
 
@@ -41,9 +45,10 @@ class WorkersOptions:
 class Workers:
     """Whoever does the heavy work, behind one face."""
 
-    def __init__(self, options: WorkersOptions) -> None:
-        """Raises ValueError for another kind, and MissingExtraError."""
+    def __init__(self, options: WorkersOptions, took: Took | None = None) -> None:
+        """`took` hears how long each job took. Raises ValueError for another kind, and MissingExtraError."""
         self._options = options
+        self._took = took
         self._lock = threading.Lock()
         self._closed = False
         self._pool = _pool(options)
@@ -71,20 +76,40 @@ class Workers:
 
         Fails with DecodeError where it is no such image. Raises ValueError where there is none.
         """
-        return self.submit(jobs.extraction_of(keyframe))
+        return self._timed("extract", jobs.extraction_of(keyframe))
 
     def survey(self, job: SurveyPair) -> Future[Comparison]:
         """Survey a pair."""
-        return self.submit(jobs.survey_of(job, self._options.scene.comparison))
+        return self._timed("compare", jobs.survey_of(job, self._options.scene.comparison))
 
     def build(self, job: BuildSurfaces) -> Future[Built]:
         """Settle poses and surfaces."""
-        return self.submit(jobs.building_of(job, self._options.scene))
+        return self._timed("build", jobs.building_of(job, self._options.scene))
 
     def submit(self, job: Job[_T]) -> Future[_T]:
         """Have any job done; its future fails with what the job raises, or JobLostError."""
         with self._lock:
             return cancelled() if self._closed else self._pool.submit(job)
+
+    def _timed(self, kind: JobKind, job: Job[_T]) -> Future[_T]:
+        whole: Future[_T] = Future()
+        self.submit(jobs.timed(job)).add_done_callback(lambda done: self._finish(kind, done, whole))
+        return whole
+
+    def _finish(self, kind: JobKind, done: Future[tuple[_T, float]], whole: Future[_T]) -> None:
+        """Runs in a worker's thread."""
+        if done.cancelled():
+            whole.cancel()
+            return
+        if not whole.set_running_or_notify_cancel():
+            return
+        if (failure := done.exception()) is not None:
+            whole.set_exception(failure)
+        else:
+            result, seconds = done.result()
+            if self._took is not None:
+                self._took(kind, seconds)
+            whole.set_result(result)
 
     def close(self) -> None:
         """Let jobs under way end, and drop those that wait."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -49,6 +50,11 @@ class Job(Generic[_T_co]):
     def packed(self) -> bytes:
         """What `perform` needs besides features. Raises what pickling raises."""
         return pickle.dumps((self.call, self.arguments), _PROTOCOL)
+
+
+def timed(job: Job[_T]) -> Job[tuple[_T, float]]:
+    """The same job, whose result comes with the seconds that it took."""
+    return Job(_timed, (job.call, *job.arguments), job.features)
 
 
 def perform(packed: bytes, features: Sequence[Features]) -> bytes:
@@ -138,6 +144,12 @@ def build(
     ]
     settled, said = settle(seen, evidence, options)
     return tuple(settled), said
+
+
+def _timed(features: tuple[Features, ...], call: Callable[..., _T], *arguments: Any) -> tuple[_T, float]:
+    begun_s = time.perf_counter()
+    result = call(features, *arguments)
+    return result, time.perf_counter() - begun_s
 
 
 def _extract(_: tuple[Features, ...], image: bytes, width: int, height: int) -> Extraction:

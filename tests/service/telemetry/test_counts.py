@@ -53,6 +53,14 @@ def test_jobs_are_timed_by_kind_from_any_thread() -> None:
     assert sample(telemetry, "covista_job_seconds_count", kind="extract") == 0
 
 
+def test_work_is_told_apart_from_waiting() -> None:
+    telemetry = Telemetry()
+    telemetry.worked("compare", 0.75)
+    telemetry.took("compare", 0.25)
+    assert sample(telemetry, "covista_job_seconds_sum", kind="compare") == 0.75
+    assert sample(telemetry, "covista_work_seconds_sum", kind="compare") == 0.25
+
+
 @pytest.mark.parametrize("stage", ["turn", "reading", "regroup"])
 def test_stages_are_timed_by_the_timer_given_also_when_they_fail(stage: str) -> None:
     times_s = iter([1.0, 1.5, 7.0, 9.0])

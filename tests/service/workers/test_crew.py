@@ -1,7 +1,7 @@
 import threading
 from collections.abc import Iterator
 from concurrent.futures import CancelledError
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import replace
 
 import numpy as np
@@ -62,6 +62,19 @@ def test_pairs_are_surveyed(workers: Workers) -> None:
     found = workers.survey(pair()).result(30)
     assert found.outcome is Outcome.MEASURED
     assert len(found.matches) > 50
+
+
+@pytest.mark.parametrize("kind", ["threads", "processes"])
+def test_how_long_work_took_is_told_and_nothing_of_what_failed(kind: str) -> None:
+    took: list[tuple[str, float]] = []
+    with closing(Workers(WorkersOptions(kind, 1), lambda job, seconds: took.append((job, seconds)))) as workers:
+        found = workers.survey(pair()).result(30)
+        broken = Keyframe(KeyframeId("r1", "b0", 0), 0, 0, pair().first_view.camera, pair().first_view.pose, b"none")
+        with pytest.raises(DecodeError):
+            workers.extract(broken).result(30)
+    assert found.outcome is Outcome.MEASURED
+    assert [job for job, _ in took] == ["compare"]
+    assert 0 < took[0][1] < 30
 
 
 @pytest.mark.parametrize("thumbnail", [None, features.thumbnail(picture()), b"no picture"])
