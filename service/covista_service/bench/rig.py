@@ -155,7 +155,7 @@ def rig(options: LoadOptions) -> Iterator[Rig]:
     with ExitStack() as stack:
         folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="covista-", ignore_cleanup_errors=True))
         database = f"sqlite:///{folder}/covista.db"
-        settings = Settings(api="127.0.0.1:0", link=(options.connect,), database=database, log_level="warning")
+        settings = Settings(api="127.0.0.1:0", link=(options.connect,), database=database, log_level="error")
         robots = children.start(load.__name__, options, load.stock(options.robots, options.features))
         stack.callback(robots.end)
         station = children.start(instruments.__name__, settings)
