@@ -72,15 +72,8 @@ _NO_MOTION: tuple[_Vector, _Quaternion] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
 
 def encode_keyframe(keyframe: Keyframe) -> bytes:
     """Bytes of a keyframe, `covista.v1.Keyframe`."""
-    message = pb.Keyframe(
-        robot=keyframe.robot,
-        boot=keyframe.boot,
-        sequence=keyframe.sequence,
-        time_ns=keyframe.pose.time_ns,
-        camera=_encode_camera(keyframe.camera),
-        world_from_camera=_encode_transform(keyframe.pose),
-        covariance=keyframe.pose.covariance,
-    )
+    message = _taken(PoseUpdate(keyframe.robot, keyframe.boot, keyframe.sequence, keyframe.pose))
+    message.camera.CopyFrom(_encode_camera(keyframe.camera))
     if keyframe.image is not None:
         message.image = keyframe.image
     elif keyframe.features is not None:
@@ -100,15 +93,7 @@ def encode_taken(update: PoseUpdate, picture: bytes) -> bytes:
 
     Fields of a message may stand in any order, so that the two parts in a row are the message.
     """
-    name = pb.Keyframe(
-        robot=update.robot,
-        boot=update.boot,
-        sequence=update.sequence,
-        time_ns=update.pose.time_ns,
-        world_from_camera=_encode_transform(update.pose),
-        covariance=update.pose.covariance,
-    )
-    return name.SerializeToString() + picture
+    return _taken(update).SerializeToString() + picture
 
 
 def encode_pose(update: PoseUpdate) -> bytes:
@@ -194,6 +179,18 @@ def _check_sender(robot: str, boot: str, expected: str | None) -> None:
             raise DecodeError(WRONG_ID, field, str(error)) from error
     if expected is not None and robot != expected:
         raise DecodeError(WRONG_ID, "robot", f"{robot!r} inside, but {expected!r} in the key")
+
+
+def _taken(update: PoseUpdate) -> pb.Keyframe:
+    """A keyframe's name and pose."""
+    return pb.Keyframe(
+        robot=update.robot,
+        boot=update.boot,
+        sequence=update.sequence,
+        time_ns=update.pose.time_ns,
+        world_from_camera=_encode_transform(update.pose),
+        covariance=update.pose.covariance,
+    )
 
 
 def _encode_camera(camera: Camera) -> pb.Camera:

@@ -48,24 +48,12 @@ class Antenna:
     def send_pose(self, robot: int, pose: Pose) -> None:
         """Send a robot's pose."""
         data = codec.encode_pose(self._update(robot, self.poses, pose))
-        self._session.put(
-            self._pose_keys[robot],
-            data,
-            encoding=codec.POSE_ENCODING,
-            congestion_control=zenoh.CongestionControl.BLOCK,
-            priority=zenoh.Priority.INTERACTIVE_HIGH,
-        )
+        self._put(self._pose_keys[robot], data, codec.POSE_ENCODING, zenoh.Priority.INTERACTIVE_HIGH)
 
     def send_keyframe(self, robot: int, pose: Pose, picture: bytes) -> None:
         """Send a robot's keyframe, its picture as `codec.encode_picture` makes it."""
         data = codec.encode_taken(self._update(robot, self.keyframes, pose), picture)
-        self._session.put(
-            self._keyframe_keys[robot],
-            data,
-            encoding=codec.KEYFRAME_ENCODING,
-            congestion_control=zenoh.CongestionControl.BLOCK,
-            priority=zenoh.Priority.DATA_LOW,
-        )
+        self._put(self._keyframe_keys[robot], data, codec.KEYFRAME_ENCODING, zenoh.Priority.DATA_LOW)
 
     def close(self) -> None:
         """Let all robots leave."""
@@ -74,6 +62,12 @@ class Antenna:
         undo += [each.undeclare for each in self._tokens]
         for each in undo:
             each()
+
+    def _put(self, key: zenoh.KeyExpr, data: bytes, encoding: str, priority: zenoh.Priority) -> None:
+        """Wait where the link is congested: what is dropped on the way would be lost without a count."""
+        self._session.put(
+            key, data, encoding=encoding, congestion_control=zenoh.CongestionControl.BLOCK, priority=priority
+        )
 
     def _update(self, robot: int, counts: list[int], pose: Pose) -> PoseUpdate:
         counts[robot] += 1
