@@ -20,4 +20,6 @@ def ground(endpoint: str) -> Iterator[Ground]:
 @pytest.fixture
 def no_thread_left() -> Iterator[None]:
     yield
+    # Zenoh's threads for callbacks are daemons where a daemon declares them: at the program's end they would abort it.
     assert not [thread for thread in threading.enumerate() if thread.name.startswith("rover-")]
+    assert not [thread for thread in threading.enumerate() if thread.daemon and "pyo3" in thread.name]

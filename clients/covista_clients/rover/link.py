@@ -6,6 +6,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import zenoh
@@ -22,6 +23,10 @@ logger = logging.getLogger(__name__)
 OPEN_TIMEOUT_MS = 1500
 _PAUSE_S = 0.1
 _ASK_EVERY_S = 0.03
+# Groups that a slow callback may leave waiting; of more, the newest remain.
+_GROUPS_WAITING = 16
+# How long leaving waits for a callback that is at work.
+_CALLBACK_END_S = 2.0
 
 OnGroup = Callable[[OwnGroupReport], object]
 
@@ -49,7 +54,6 @@ class RoverLink:
         *,
         owned: bool,
         token: bool,
-        wake: Callable[[], None],
     ) -> None:
         self._session = session
         self._site, self._robot, self._boot = site, robot, boot
@@ -69,9 +73,7 @@ class RoverLink:
             priority=zenoh.Priority.INTERACTIVE_HIGH,
             express=True,
         )
-        listeners = [pub.declare_matching_listener(lambda _: wake()) for pub in (self._keyframes, self._poses)]
         self._undo: list[Callable[[], object]] = [self._keyframes.undeclare, self._poses.undeclare]
-        self._undo += [listener.undeclare for listener in listeners]
         if token:
             self._undo.append(session.liveliness().declare_token(keys.alive(site, robot, boot)).undeclare)
 
@@ -102,15 +104,19 @@ class RoverLink:
         )
 
     def follow_group(self, callback: OnGroup) -> None:
-        """Call `callback` with the robot's group, the present one first, from a thread of zenoh's."""
+        """Call `callback` with the robot's group, the present one first, from a thread of its own."""
         # Late publishers too: a station that starts after the rover says where the rover stands.
         subscriber = zenoh.ext.declare_advanced_subscriber(
             self._session,
             keys.own_group(self._site, self._robot),
-            lambda sample: self._tell(callback, sample.payload.to_bytes()),
+            zenoh.handlers.RingChannel(_GROUPS_WAITING),
             history=zenoh.ext.HistoryConfig(detect_late_publishers=True),
         )
-        self._undo.append(subscriber.undeclare)
+        # No callback of zenoh's: its thread cannot be joined, and one that outlives the interpreter aborts the program.
+        name = f"rover-{self._robot}-groups"
+        follower = threading.Thread(target=self._follow, args=(subscriber, callback), name=name, daemon=True)
+        follower.start()
+        self._undo += [partial(follower.join, _CALLBACK_END_S), subscriber.undeclare]
 
     def report(self, timeout_s: float) -> RobotReport | None:
         """What the station knows of this robot, or None where it does not answer."""
@@ -134,10 +140,17 @@ class RoverLink:
         if self._owned:
             self._session.close()
 
-    def _tell(self, callback: OnGroup, data: bytes) -> None:
-        # What was queued before closing still comes after it.
-        if self._closed:
-            return
+    def _follow(self, subscriber: zenoh.ext.AdvancedSubscriber[Any], callback: OnGroup) -> None:
+        try:
+            for sample in subscriber:
+                # What was queued before closing still comes after it.
+                if not self._closed:
+                    self._tell(callback, sample.payload.to_bytes())
+        except zenoh.ZError:
+            logger.debug("%s follows its group no longer", self._robot)
+
+    @staticmethod
+    def _tell(callback: OnGroup, data: bytes) -> None:
         try:
             callback(OwnGroupReport.read(data))
         except Exception:

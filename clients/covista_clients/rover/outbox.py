@@ -36,12 +36,12 @@ class Outbox(Generic[_Item]):
             self._changed.notify_all()
             return self._sequence
 
-    def take(self, wanted: Callable[[], bool]) -> tuple[int, _Item] | None:
-        """Wait for an item that is `wanted`; None when woken for something else, or closed."""
+    def take(self, wanted: Callable[[], bool], within_s: float | None = None) -> tuple[int, _Item] | None:
+        """Wait for an item (at most `within_s`), and take it if it is `wanted`; None too when woken, or closed."""
         with self._changed:
             self._sending = False
             self._changed.notify_all()
-            self._changed.wait_for(lambda: self._woken or self._closed or (self._item is not None and wanted()))
+            self._changed.wait_for(lambda: self._woken or self._closed or self._item is not None, within_s)
             self._woken = False
             if self._item is None or self._closed or not wanted():
                 return None
@@ -58,6 +58,11 @@ class Outbox(Generic[_Item]):
         """Wait until nothing waits and nothing is being sent; False after `timeout_s`."""
         with self._changed:
             return self._changed.wait_for(lambda: self._item is None and not self._sending, timeout_s)
+
+    @property
+    def waits(self) -> bool:
+        """Whether an item waits."""
+        return self._item is not None
 
     @property
     def closed(self) -> bool:

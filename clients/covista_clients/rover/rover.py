@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import logging
 import threading
 import time
@@ -24,6 +25,8 @@ from covista_clients.rover.outbox import Outbox
 logger = logging.getLogger(__name__)
 
 CLOSE_TIMEOUT_S = 2.0
+# How soon what waits is sent once a station listens.
+_LOOK_EVERY_S = 0.05
 
 
 class Rover:
@@ -71,7 +74,8 @@ class Rover:
         self._callbacks: list[OnGroup] = []
         if session is not None:
             self._attach(session, owned=False)
-        # A daemon: a rover that was never closed does not keep its program from ending.
+        # A daemon: a rover that was never closed does not keep its program from ending, and leaves at its end.
+        atexit.register(self._leave)
         self._sender = threading.Thread(target=self._work, name=f"rover-{robot}", daemon=True)
         self._sender.start()
 
@@ -86,6 +90,9 @@ class Rover:
         with self._pose_news:
             self._held_pose = _checked_pose(pose)
             self._flush_pose()
+            held = self._held_pose is not None
+        if held:
+            self._outbox.wake()
 
     def send_keyframe(self, image: Image, pose: Pose, thumbnail: bytes | None = None) -> KeyframeId:
         """Hand over a picture, (H, W) grey or (H, W, 3) BGR uint8, JPEG, PNG or WebP bytes, or Features, with its pose.
@@ -117,6 +124,7 @@ class Rover:
             if wait_s != 0 and not (self._drain(deadline_s) and self._confirm(deadline_s)):
                 logger.warning("%s leaves without the station's confirmation of all it had to say", self.robot)
         finally:
+            atexit.unregister(self._leave)
             self._stop.set()
             self._outbox.close()
             self._sender.join()
@@ -131,15 +139,16 @@ class Rover:
     ) -> None:
         self.close()
 
+    def _leave(self) -> None:
+        self.close(wait_s=0)
+
     def _check_open(self) -> None:
         if self._closing:
             raise LinkError(f"rover {self.robot} is closed")
 
     def _attach(self, session: zenoh.Session, *, owned: bool) -> None:
         with self._link_lock:
-            self._link = RoverLink(
-                session, self.site, self.robot, self.boot, owned=owned, token=self._token, wake=self._outbox.wake
-            )
+            self._link = RoverLink(session, self.site, self.robot, self.boot, owned=owned, token=self._token)
             for callback in self._callbacks:
                 self._link.follow_group(callback)
 
@@ -154,9 +163,12 @@ class Rover:
         while link is not None and not self._outbox.closed:
             with self._pose_news:
                 self._flush_pose()
-            taken = self._outbox.take(link.keyframes_wanted)
+                held = self._held_pose is not None
+            taken = self._outbox.take(link.keyframes_wanted, 0 if held else None)
             if taken is not None:
                 self._send_keyframe(link, *taken)
+            elif held or self._outbox.waits:
+                self._stop.wait(_LOOK_EVERY_S)
 
     def _send_keyframe(self, link: RoverLink, sequence: int, item: tuple[Pose, Callable[[], Content]]) -> None:
         pose, work = item

@@ -61,3 +61,12 @@ def test_closing_ends_a_wait() -> None:
     sender.join()
     assert taken == [None]
     assert outbox.closed
+
+
+def test_a_wait_ends_by_itself() -> None:
+    outbox: Outbox[str] = Outbox()
+    assert outbox.take(always, 0) is None
+    assert not outbox.waits
+    outbox.offer("one")
+    assert outbox.waits
+    assert outbox.take(always, 0) == (0, "one")

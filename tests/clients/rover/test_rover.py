@@ -1,5 +1,7 @@
 import logging
 import queue
+import subprocess
+import sys
 import threading
 import time
 
@@ -251,3 +253,21 @@ def wait_until(condition: object) -> None:
     while not condition():
         assert time.monotonic() < deadline
         pause.wait(0.01)
+
+
+UNCLOSED = """
+import sys, threading
+from covista_clients import Camera, Rover
+
+rover = Rover("r1", Camera(fx=60, fy=60, cx=31.5, cy=23.5, width=64, height=48), sys.argv[1])
+told = threading.Event()
+rover.on_group(lambda report: told.set())
+assert told.wait(10)
+"""
+
+
+def test_a_rover_that_was_never_closed_leaves_at_the_end_of_its_program(endpoint: str, ground: Ground) -> None:
+    ground.tell_group("r1", "A")
+    ended = subprocess.run([sys.executable, "-c", UNCLOSED, endpoint], capture_output=True, text=True, timeout=30)
+    assert (ended.returncode, ended.stderr) == (0, "")
+    ground.wait(lambda: not ground.tokens)
