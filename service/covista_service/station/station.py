@@ -15,6 +15,7 @@ from covista_service.station.events import (
     Event,
     ExtractFeatures,
     FeaturesExtracted,
+    ForgetRobot,
     GroupsChanged,
     GroupsEvaluated,
     Happened,
@@ -24,6 +25,7 @@ from covista_service.station.events import (
     MessageDropped,
     MessagesReceived,
     PoseArrived,
+    SettingsGiven,
     SurfacesBuilt,
     SurveyDone,
     Tick,
@@ -155,9 +157,21 @@ class Station:
                 return self._features_extracted(event)
             case SurveyDone() | SurfacesBuilt():
                 return self._take(event, now_ns)
+            case SettingsGiven() | ForgetRobot():
+                return self._obey(event, now_ns)
             case Tick():
                 return self._tick(now_ns)
         return []
+
+    def _obey(self, event: SettingsGiven | ForgetRobot, now_ns: int) -> list[Effect]:
+        """What a person wants."""
+        if isinstance(event, SettingsGiven):
+            self.set_grouping(event.options)
+            return [Happened(EventKind.SETTINGS, now_ns, event.text, by=event.by)]
+        if event.robot not in self._roster:
+            return []
+        self._forget(event.robot)
+        return [Happened(EventKind.STATUS, now_ns, f"{event.robot} is forgotten", (event.robot,), by=event.by)]
 
     def _token(self, event: TokenSeen | TokenLost, now_ns: int) -> None:
         if isinstance(event, TokenSeen):
