@@ -15,6 +15,7 @@ RobotId = Annotated[str, Field(pattern=f"^{ID_PATTERN}$", examples=["r1"])]
 Share = Annotated[float, Field(ge=0, le=1)]
 Point = tuple[float, float]
 Polygon = list[Point]
+Cursor = Annotated[str | None, Field(description="Cursor of the next page; null on the last.")]
 
 
 def _utc(value: datetime) -> datetime:
@@ -115,9 +116,10 @@ class RobotReport(Report):
 
 
 class RobotsReport(Report):
-    """All robots."""
+    """All robots, or a page of them."""
 
     robots: list[RobotReport]
+    next: Cursor = None
 
 
 class PairKeyframes(Report):
@@ -178,6 +180,7 @@ class PairsReport(Report):
     """Pairs of robots, each unordered pair once."""
 
     pairs: list[PairSummary]
+    next: Cursor = None
 
 
 Matrix = list[list[float]]
@@ -336,7 +339,64 @@ class EventReport(Report):
     labels: list[str] = []
     revision_before: int | None = None
     revision_after: int | None = None
+    by: str | None = Field(default=None, description="Name of the token of whoever wanted it.")
     text: str
+
+
+class Gap(Report):
+    """A time of which the history lacks entries that there were, and why."""
+
+    since: Time
+    until: Time
+    lost: int = Field(ge=0, description="Entries that are missing; 0 where nobody could count them.")
+    reason: str = Field(examples=["the database could not be used"])
+
+
+class HistoryPage(Report):
+    """What all pages of the history share; entries are in the order of time, the oldest first."""
+
+    next: Cursor = None
+    gaps: list[Gap] = Field(default=[], description="Gaps of the history within the time that this page is of.")
+
+
+class GroupsHistory(HistoryPage):
+    """Revisions of the groups."""
+
+    items: list[GroupsReport]
+
+
+class EventsHistory(HistoryPage):
+    """Events, in the order of their ids."""
+
+    items: list[EventReport]
+
+
+class PairMoment(Report):
+    """The overlap of a pair as it was from `time` on; null is unknown."""
+
+    time: Time
+    overlap_a: Share | None
+    overlap_b: Share | None
+    found_by: FoundBy
+
+
+class PairHistory(HistoryPage):
+    """The overlap of a pair over time, thinned: a moment is kept where it is news."""
+
+    a: RobotId
+    b: RobotId
+    items: list[PairMoment]
+
+
+class TrackPoint(PoseReport):
+    """Where a robot's camera was; `time` is when the station heard of it."""
+
+
+class RobotTrack(HistoryPage):
+    """Where a robot was over time, thinned."""
+
+    robot: RobotId
+    items: list[TrackPoint]
 
 
 class Problem(Report):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import secrets
+import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
 
@@ -25,6 +26,7 @@ from covista_service.link.publish import Publisher
 from covista_service.link.queries import Queries
 from covista_service.link.session import open_session
 from covista_service.loop import Loop
+from covista_service.station.memory import Memory
 from covista_service.station.options import GroupingOptions, StationOptions
 from covista_service.station.station import Station
 from covista_service.store.database import check_url
@@ -75,8 +77,10 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
         options = WorkersOptions(settings.workers, settings.workers_count)
         workers = await asyncio.to_thread(Workers, options, telemetry.took)
         close_later(workers.close)
+        station = Station(_station_options(settings, workers.capacity))
+        station.restore(Memory(revision=history.last.revision), time.time_ns())
         loop = Loop(
-            Station(_station_options(settings, workers.capacity, history.last.revision)),
+            station,
             Inbox(mailboxes),
             workers,
             (publisher, history),
@@ -151,7 +155,7 @@ def _health(parts: dict[str, PartHealth]) -> Health:
     return Health(status="ready", parts=parts)
 
 
-def _station_options(settings: Settings, capacity: int, revision: int) -> StationOptions:
+def _station_options(settings: Settings, capacity: int) -> StationOptions:
     return StationOptions(
         capacity=capacity,
         live_after_s=settings.live_after_s,
@@ -160,7 +164,6 @@ def _station_options(settings: Settings, capacity: int, revision: int) -> Statio
         decay_after_s=settings.decay_after_s,
         unknown_after_s=settings.unknown_after_s,
         retry_after_s=settings.retry_after_s,
-        revision=revision,
         grouping=_grouping_options(settings.live),
     )
 

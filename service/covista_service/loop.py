@@ -51,6 +51,8 @@ from covista_service.telemetry.journal import note_effect, note_event
 TICK_S = 0.25
 # While news of keyframes waits to be evaluated.
 SOON_S = 0.02
+# Whoever wants something done waits so long for a turn.
+DO_TIMEOUT_S = 5.0
 # Mail of so many robots is opened before workers' results and other tasks get their turn.
 BATCH = 32
 _NS_PER_S = 1e9
@@ -165,6 +167,7 @@ class Loop:
         self._event_ids = itertools.count(next_event)
         self._clock = clock
         self._results: deque[Event] = deque()
+        self._done: list[asyncio.Future[None]] = []
         self._awake = asyncio.Event()
         self._asyncio: asyncio.AbstractEventLoop | None = None
         self._turned_ns = clock()
@@ -200,10 +203,14 @@ class Loop:
         self._resize()
         events, self._next_ns = self._source.drain(BATCH, began_ns)
         effects: list[Effect] = []
+        done, self._done = self._done, []
         results = [self._results.popleft() for _ in range(len(self._results))]
         for event in itertools.chain(results, events, (Tick(),)):
             effects += self._receive(event)
         self._tell(effects)
+        for each in done:
+            if not each.done():
+                each.set_result(None)
         self._turned_ns = self._clock()
         return bool(self._results) or (self._next_ns is not None and self._next_ns <= began_ns)
 
@@ -214,6 +221,17 @@ class Loop:
                 self._asyncio.call_soon_threadsafe(self._awake.set)
             except RuntimeError:
                 log.debug("woken after the end")
+
+    async def do(self, event: Event) -> None:
+        """Have the station take in an event of one's own; returns once it has, and the sinks have heard of it.
+
+        Only in the loop's own thread. Raises TimeoutError where no turn comes.
+        """
+        done: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._results.append(event)
+        self._done.append(done)
+        self._awake.set()
+        await asyncio.wait_for(done, DO_TIMEOUT_S)
 
     def snapshot(self) -> Snapshot:
         """The station as it is; only in the loop's own thread."""

@@ -72,6 +72,7 @@ def event_report(number: int, happened: Happened) -> reports.EventReport:
         labels=list(happened.labels),
         revision_before=happened.revision_before,
         revision_after=happened.revision_after,
+        by=happened.by,
         text=happened.text,
     )
 

@@ -13,6 +13,7 @@ from covista_service.perception.comparison import Comparison
 from covista_service.perception.extent import UNTOLD, Doubt
 from covista_service.perception.scene import Evidence, Settled, Sight
 from covista_service.station.ledger import Run
+from covista_service.station.options import GroupingOptions
 
 Topic = Literal["keyframe", "pose"]
 Pair = tuple[str, str]
@@ -148,6 +149,23 @@ class SurfacesBuilt:
 
 
 @dataclass(frozen=True, slots=True)
+class SettingsGiven:
+    """The live settings are to be these from now on; `text` says what changes, `by` who wants it."""
+
+    options: GroupingOptions
+    text: str
+    by: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ForgetRobot:
+    """All that is known of a robot is to be dropped; `by` wants it."""
+
+    robot: str
+    by: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Tick:
     """Time has passed, or a burst of events is over: presence, agenda and groups are brought up to date."""
 
@@ -162,6 +180,8 @@ Event = (
     | FeaturesExtracted
     | SurveyDone
     | SurfacesBuilt
+    | SettingsGiven
+    | ForgetRobot
     | Tick
 )
 
@@ -228,6 +248,7 @@ class Happened:
     labels: tuple[str, ...] = ()
     revision_before: int | None = None
     revision_after: int | None = None
+    by: str | None = None
 
 
 Effect = ExtractFeatures | SurveyPair | BuildSurfaces | GroupsEvaluated | GroupsChanged | Happened
