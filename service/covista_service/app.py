@@ -27,8 +27,10 @@ from covista_service.link.session import open_session
 from covista_service.loop import Loop
 from covista_service.station.options import StationOptions
 from covista_service.station.station import Station
+from covista_service.store.archive import Archive
 from covista_service.store.database import check_url
 from covista_service.store.history import History
+from covista_service.store.retention import Retention
 from covista_service.telemetry import Telemetry, about
 from covista_service.workers import Workers, WorkersOptions, check_kind, daemon
 
@@ -69,7 +71,10 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
         close_later(Ingest(session, settings.site, mailboxes).close)
         publisher = Publisher(session, settings.site)
         close_later(publisher.close)
-        history = await asyncio.to_thread(History, settings.database)
+        archive = Archive(settings.database)
+        close_later(archive.close)
+        retention = Retention(settings.retention_days, settings.retention_mb)
+        history = await asyncio.to_thread(lambda: History(settings.database, retention=retention))
         close_later(history.close)
         telemetry = Telemetry()
         options = WorkersOptions(settings.workers, settings.workers_count)
@@ -85,6 +90,7 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
         )
         task = asyncio.create_task(_run(loop), name="covista-loop")
         stack.push_async_callback(_end, task)
+        history.follow(loop.ask)
         close_later(Queries(session, settings.site, loop.ask).close)
         link = PartHealth(status="ready", detail=", ".join((*settings.link, *settings.connect)))
 

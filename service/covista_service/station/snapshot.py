@@ -31,8 +31,9 @@ Reason = Literal["no_pose", "gone"]
 class RobotView:
     """One robot; `camera` is that of its newest keyframe.
 
-    `keyframe` is the newest in use, `announced` the newest that came, usable or not. `judged` is by which it was judged
-    whom its view may meet.
+    `in_use` is the newest keyframe in use, `announced` the newest that came, usable or not. `judged` is by which it was
+    judged whom its view may meet. It lives as long as it is `present`, that is, has a token; else since its last sign
+    of life, in the station's time.
     """
 
     id: str
@@ -41,7 +42,7 @@ class RobotView:
     boot: str | None
     camera: Camera | None
     fix: Fix | None
-    keyframe: KeyframeId | None
+    in_use: Keyframe | None
     announced: KeyframeId | None
     last_seen_ns: int | None
     clock_offset_s: float | None
@@ -50,6 +51,13 @@ class RobotView:
     poses: Counts
     last_problem: str | None
     judged: Judged | None = None
+    present: bool = False
+    sign_of_life_ns: int = 0
+
+    @property
+    def keyframe(self) -> KeyframeId | None:
+        """Name of the newest keyframe in use."""
+        return None if self.in_use is None else self.in_use.id
 
     @classmethod
     def of(cls, robot: Robot, group: str | None, correction: Correction | None, judged: Judged | None) -> RobotView:
@@ -62,7 +70,7 @@ class RobotView:
             boot=robot.boot,
             camera=None if robot.arrived is None else robot.arrived.camera,
             fix=robot.fix,
-            keyframe=None if robot.keyframe is None else robot.keyframe.id,
+            in_use=robot.keyframe,
             announced=robot.announced,
             last_seen_ns=robot.last_seen_ns,
             clock_offset_s=None if offset_ns is None else offset_ns / NS_PER_S,
@@ -71,6 +79,8 @@ class RobotView:
             poses=robot.ledgers["pose"].counts(),
             last_problem=robot.last_problem,
             judged=judged,
+            present=bool(robot.tokens),
+            sign_of_life_ns=robot.sign_of_life_ns,
         )
 
 
