@@ -54,7 +54,7 @@ class History:
         self._first_pause_s, self._period_s = first_pause_s, period_s
         self._changed = threading.Condition()
         self._closing = False
-        self._written = 0
+        self._written = self._known_lost = 0
         self._problem: str | None = None
         self._ask: Ask | None = None
         self._sampler = Sampler()
@@ -96,11 +96,15 @@ class History:
             self._changed.notify_all()
 
     def flush(self, timeout_s: float) -> bool:
-        """Wait until all that was taken so far is written; False if it is not, or some of it never will be."""
+        """Wait until all that was taken so far is written; False if it is not.
+
+        Also if some of what was taken since the last time that somebody waited never will be.
+        """
         with self._changed:
-            came, lost = self._backlog.told_came, self._backlog.lost
-            done = self._changed.wait_for(lambda: self._closing or self._backlog.told_went >= came, timeout_s)
-            return done and self._backlog.told_went >= came and self._backlog.lost == lost
+            came = self._backlog.told_came
+            self._changed.wait_for(lambda: self._closing or self._backlog.told_went >= came, timeout_s)
+            before, self._known_lost = self._known_lost, self._backlog.told_lost
+            return self._backlog.told_went >= came and self._known_lost == before
 
     def recall(self, forget_after_s: float, unknown_after_s: float) -> Memory:
         """What the station before this one knew, as far as it is young enough; all there is where it can be read.
