@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import secrets
+import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
 
@@ -80,13 +81,16 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
         options = WorkersOptions(settings.workers, settings.workers_count)
         workers = await asyncio.to_thread(Workers, options, telemetry.took)
         close_later(workers.close)
+        station = Station(_station_options(settings, workers.capacity))
+        memory = await asyncio.to_thread(history.recall, settings.forget_after_s, settings.unknown_after_s)
+        station.restore(memory, time.time_ns())
         loop = Loop(
-            Station(_station_options(settings, workers.capacity, history.last.revision)),
+            station,
             Inbox(mailboxes),
             workers,
             (publisher, history),
             telemetry,
-            next_event=history.last.event + 1,
+            next_event=memory.event + 1,
         )
         task = asyncio.create_task(_run(loop), name="covista-loop")
         stack.push_async_callback(_end, task)
@@ -157,7 +161,7 @@ def _health(parts: dict[str, PartHealth]) -> Health:
     return Health(status="ready", parts=parts)
 
 
-def _station_options(settings: Settings, capacity: int, revision: int) -> StationOptions:
+def _station_options(settings: Settings, capacity: int) -> StationOptions:
     return StationOptions(
         capacity=capacity,
         live_after_s=settings.live_after_s,
@@ -166,6 +170,5 @@ def _station_options(settings: Settings, capacity: int, revision: int) -> Statio
         decay_after_s=settings.decay_after_s,
         unknown_after_s=settings.unknown_after_s,
         retry_after_s=settings.retry_after_s,
-        revision=revision,
         grouping=answers.grouping_options(settings.live),
     )

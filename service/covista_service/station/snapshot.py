@@ -32,8 +32,8 @@ class RobotView:
     """One robot; `camera` is that of its newest keyframe.
 
     `in_use` is the newest keyframe in use, `announced` the newest that came, usable or not. `judged` is by which it was
-    judged whom its view may meet. It lives as long as it is `present`, that is, has a token; else since its last sign
-    of life, in the station's time.
+    judged whom its view may meet. Who is `present` has a token, and lives; `sign_of_life_ns` is the last one of others,
+    in the station's time.
     """
 
     id: str
@@ -70,7 +70,7 @@ class RobotView:
             boot=robot.boot,
             camera=None if robot.arrived is None else robot.arrived.camera,
             fix=robot.fix,
-            in_use=robot.keyframe,
+            in_use=robot.keyframe or robot.remembered,
             announced=robot.announced,
             last_seen_ns=robot.last_seen_ns,
             clock_offset_s=None if offset_ns is None else offset_ns / NS_PER_S,
@@ -119,7 +119,8 @@ class PairView:
 class SimilarityView:
     """The matrices (N, N) of the last evaluation in the order of `robots`; unknown overlaps are NaN.
 
-    `sigma_m` is the range of Eq. 15. Distances and closeness are computed when somebody asks.
+    `sigma_m` is the range of Eq. 15. Overlaps are as last told; `mutual`, what two share, is smoothed. Distances and
+    closeness are computed when somebody asks.
     """
 
     revision: int
@@ -128,6 +129,7 @@ class SimilarityView:
     similarity: Floats
     overlap: Floats
     squared_m2: Floats
+    mutual: Floats
 
     @property
     def distance_m(self) -> Floats:
@@ -153,7 +155,8 @@ class GroupsView:
     """The grouping in force since `time_ns`.
 
     As last evaluated: the scores of the numbers of groups, a note on settings that cannot be kept, and the robots of
-    groups that others are proposed for and not shown yet (`waiting`).
+    groups that others are proposed for and not shown yet (`waiting`). `last_label` is the highest number of a label
+    that was ever used.
     """
 
     revision: int
@@ -164,6 +167,7 @@ class GroupsView:
     settings: GroupingOptions
     note: str | None = None
     waiting: tuple[str, ...] = ()
+    last_label: int = 0
     by_label: Mapping[str, GroupView] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

@@ -64,7 +64,7 @@ class History:
         self._busy_s: float | None = None
         self._pause_s = 0.0
         self._more = False
-        self.last = self._start()
+        self.last = self._used = self._start()
         self._thread = threading.Thread(target=self._run, name="covista-history", daemon=True)
         self._thread.start()
 
@@ -91,7 +91,10 @@ class History:
             entries.append(answers.groups_report(news.snapshot))
         if news.settings is not None and news.patch:
             entries.append(SettingsChange(time_of(news.snapshot.wall_ns), _by(news), news.patch, news.settings))
+        groups = news.snapshot.groups
+        event = max((each.id for each in news.events), default=0)
         with self._changed:
+            self._used = self._used.over(LastNumbers(groups.revision, event, groups.last_label))
             self._backlog.tell(entries)
             self._changed.notify_all()
 
@@ -230,11 +233,11 @@ class History:
         with self._changed:
             batch, loss = self._backlog.take(self._batch), self._backlog.loss
             reason = self._problem or "entries came faster than they could be written"
-            self._busy_s = time.monotonic()
+            self._busy_s, used = time.monotonic(), self._used
         if not batch and loss is None and self._problem is None:
             return False
         try:
-            self._writer.write(batch, loss, reason)
+            self._writer.write(batch, loss, reason, used)
         except Exception as error:
             self._put_back(batch, error)
             if is_passing(error):

@@ -65,12 +65,10 @@ class Writer:
         with self._opening():
             pass
 
-    def write(self, batch: Sequence[Entry], loss: Loss | None, reason: str) -> None:
-        """Append entries, and a gap for what is missing before them."""
+    def write(self, batch: Sequence[Entry], loss: Loss | None, reason: str, used: LastNumbers) -> None:
+        """Append entries, and a gap for what is missing; numbers up to `used` are."""
         self._reopen()
-        used = self._used
-        for entry in batch:
-            used = used.of_entry(entry)
+        used = used.over(self._used)
         reserved = ahead(self._reserved, used)
         with self._engine.begin() as connection:
             write(connection, batch)
