@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import islice
 
 from sqlalchemy import Connection, Table, delete
 
@@ -17,6 +18,8 @@ from covista_service.store.upserts import Row, remove, upsert
 
 # An overlap that has changed by less since it was written is written with the next keyframe.
 _CHANGED = 0.01
+# So many pairs are written at a time; of a thousand robots more may change in a second, and wait for the next.
+_MOST_PAIRS = 1000
 # Keyframes that nothing names any more are looked for after so many writes.
 _SWEEP = 30
 # Who has a token and sends nothing is written so often.
@@ -48,6 +51,7 @@ class Present:
         self._writes = 0
         self._robots: dict[str, tuple[RobotView, int]] = {}
         self._pairs: dict[Pair, Answer | None] = {}
+        self._waiting: dict[Pair, None] = {}
         self._keyframes: set[KeyframeId] = set()
 
     def write(self, connection: Connection, snapshot: Snapshot) -> None:
@@ -78,13 +82,17 @@ class Present:
             changes.gone[robots_now].append((name,))
 
     def _change_pairs(self, snapshot: Snapshot, changes: _Changes) -> None:
-        pairs = self._pairs
+        pairs, waiting = self._pairs, self._waiting
         for pair, record in snapshot.records.items():
             answer = record.answer
-            if pair in pairs and (pairs[pair] is answer or _hardly_other(pairs[pair], answer)):
-                continue
-            pairs[pair] = answer
-            changes.rows[pairs_now].append(self._pair(pair, answer, snapshot, changes))
+            if pair not in pairs or not (pairs[pair] is answer or _hardly_other(pairs[pair], answer)):
+                waiting[pair] = None
+        # Who has waited longest comes first, with what is known of it now.
+        for pair in list(islice(waiting, _MOST_PAIRS)):
+            del waiting[pair]
+            if pair in snapshot.records:
+                pairs[pair] = answer = snapshot.records[pair].answer
+                changes.rows[pairs_now].append(self._pair(pair, answer, snapshot, changes))
         for pair in [pair for pair in pairs if pair not in snapshot.records]:
             del pairs[pair]
             changes.gone[pairs_now].append(pair)
