@@ -9,15 +9,15 @@ import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
 
-from covista_schemas.reports import GroupBounds, Health, LiveSettings, PartHealth
+from covista_schemas.reports import Health, PartHealth
 from fastapi import FastAPI
 
+from covista_service import answers
 from covista_service.access import check_listening
 from covista_service.api import rest
 from covista_service.api.deps import Parts, State
 from covista_service.api.vitals import Vitals
 from covista_service.config import Settings
-from covista_service.grouping.hysteresis import HysteresisOptions
 from covista_service.grouping.warming import warm_up
 from covista_service.link.inbox import Inbox
 from covista_service.link.ingest import Ingest
@@ -26,11 +26,12 @@ from covista_service.link.publish import Publisher
 from covista_service.link.queries import Queries
 from covista_service.link.session import open_session
 from covista_service.loop import Loop
-from covista_service.station.memory import Memory
-from covista_service.station.options import GroupingOptions, StationOptions
+from covista_service.station.options import StationOptions
 from covista_service.station.station import Station
+from covista_service.store.archive import Archive
 from covista_service.store.database import check_url
 from covista_service.store.history import History
+from covista_service.store.retention import Retention
 from covista_service.telemetry import Telemetry, about
 from covista_service.workers import Workers, WorkersOptions, check_kind, daemon
 
@@ -71,24 +72,29 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
         close_later(Ingest(session, settings.site, mailboxes).close)
         publisher = Publisher(session, settings.site)
         close_later(publisher.close)
-        history = await asyncio.to_thread(History, settings.database)
+        archive = Archive(settings.database)
+        close_later(archive.close)
+        retention = Retention(settings.retention_days, settings.retention_mb)
+        history = await asyncio.to_thread(lambda: History(settings.database, retention=retention))
         close_later(history.close)
         telemetry = Telemetry()
         options = WorkersOptions(settings.workers, settings.workers_count)
         workers = await asyncio.to_thread(Workers, options, telemetry.took)
         close_later(workers.close)
         station = Station(_station_options(settings, workers.capacity))
-        station.restore(Memory(revision=history.last.revision), time.time_ns())
+        memory = await asyncio.to_thread(history.recall, settings.forget_after_s, settings.unknown_after_s)
+        station.restore(memory, time.time_ns())
         loop = Loop(
             station,
             Inbox(mailboxes),
             workers,
             (publisher, history),
             telemetry,
-            next_event=history.last.event + 1,
+            next_event=memory.event + 1,
         )
         task = asyncio.create_task(_run(loop), name="covista-loop")
         stack.push_async_callback(_end, task)
+        history.follow(loop.ask)
         close_later(Queries(session, settings.site, loop.ask).close)
         link = PartHealth(status="ready", detail=", ".join((*settings.link, *settings.connect)))
 
@@ -164,20 +170,5 @@ def _station_options(settings: Settings, capacity: int) -> StationOptions:
         decay_after_s=settings.decay_after_s,
         unknown_after_s=settings.unknown_after_s,
         retry_after_s=settings.retry_after_s,
-        grouping=_grouping_options(settings.live),
-    )
-
-
-def _grouping_options(live: LiveSettings) -> GroupingOptions:
-    groups = live.groups
-    bounds = (groups.min, groups.max) if isinstance(groups, GroupBounds) else groups
-    return GroupingOptions(
-        alpha=live.alpha,
-        groups=bounds,
-        min_group_size=live.min_group_size,
-        sigma=live.sigma,
-        criterion=live.criterion,
-        grouping=live.grouping,
-        hysteresis=HysteresisOptions(live.hysteresis.gain, live.hysteresis.persistence_s),
-        smoothing=live.hysteresis.smoothing,
+        grouping=answers.grouping_options(settings.live),
     )
