@@ -2,44 +2,25 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
 from enum import StrEnum
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field
 
-from covista_schemas.keys import ID_PATTERN
 from covista_schemas.messages import Camera
+from covista_schemas.report import Report as Report
+from covista_schemas.report import RobotId as RobotId
+from covista_schemas.report import Share as Share
+from covista_schemas.report import Time as Time
+from covista_schemas.report import time_of as time_of
+from covista_schemas.settings import GroupBounds as GroupBounds
+from covista_schemas.settings import Hysteresis as Hysteresis
+from covista_schemas.settings import LiveSettings as LiveSettings
+from covista_schemas.settings import SettingsPatch as SettingsPatch
 
-RobotId = Annotated[str, Field(pattern=f"^{ID_PATTERN}$", examples=["r1"])]
-Share = Annotated[float, Field(ge=0, le=1)]
 Point = tuple[float, float]
 Polygon = list[Point]
 Cursor = Annotated[str | None, Field(description="Cursor of the next page; null on the last.")]
-
-
-def _utc(value: datetime) -> datetime:
-    return value.astimezone(UTC) if value.tzinfo else value.replace(tzinfo=UTC)
-
-
-Time = Annotated[datetime, AfterValidator(_utc)]
-
-
-def time_of(time_ns: int) -> datetime:
-    """A moment in ns since the epoch as UTC time (microseconds are what RFC 3339 readers keep)."""
-    seconds, rest = divmod(time_ns, 1_000_000_000)
-    return datetime.fromtimestamp(seconds, UTC).replace(microsecond=rest // 1000)
-
-
-class Report(BaseModel):
-    """What all answers share: frozen, and no number that is not finite."""
-
-    model_config = ConfigDict(frozen=True, allow_inf_nan=False)
-
-    @classmethod
-    def read(cls, data: bytes | str) -> Self:
-        """The report in JSON; what only later versions of the station say is passed over. Raises ValidationError."""
-        return cls.model_validate_json(data, extra="ignore")
 
 
 class Status(StrEnum):
@@ -221,70 +202,6 @@ class Score(Report):
     score: float
 
 
-class GroupBounds(Report):
-    """Least and largest number of groups to consider."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    min: int = Field(ge=1)
-    max: int = Field(ge=1)
-
-    @model_validator(mode="after")
-    def _order(self) -> Self:
-        if self.min > self.max:
-            raise ValueError("min must not be larger than max")
-        return self
-
-
-class Hysteresis(Report):
-    """When groups on show change, and how overlaps are smoothed: so that what flickers does not make groups flicker."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    gain: float = Field(
-        default=0.05,
-        ge=0,
-        le=0.9,
-        description="Share of the groups on show in the similarity that groups are made from: others must gain more.",
-    )
-    persistence_s: float = Field(
-        default=5.0,
-        ge=0,
-        le=3600,
-        description="A change without a clear gain is shown when it has been proposed for so long.",
-    )
-    smoothing: float = Field(
-        default=0.3, gt=0, le=1, description="Weight of a pair's newest overlap in the similarity; 1: no smoothing."
-    )
-
-
-class LiveSettings(Report):
-    """The settings that can change while the station runs."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    alpha: float = Field(default=0.5, ge=0, le=1, description="Weight of the overlap against closeness, Eq. 16.")
-    groups: Literal["auto"] | Annotated[int, Field(ge=1)] | GroupBounds = Field(
-        default="auto", description="auto, a number of groups, or bounds on it: {min, max}, both, 1 <= min <= max."
-    )
-    min_group_size: int = Field(default=1, ge=1, description="How many robots a group has at least.")
-    sigma: Literal["shared", "std"] | Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False)] = Field(
-        default="shared",
-        description="Range of Eq. 15: shared (by the distances of robots that see the same), "
-        "std (standard deviation of all distances, as in the paper), or metres.",
-    )
-    criterion: Literal["adaptive", "silhouette", "gain", "fiedler", "paper", "eigengap", "modularity"] = Field(
-        default="adaptive",
-        description="How the number of groups is chosen; paper is Eq. 17 as printed, for 30 robots at most.",
-    )
-    grouping: Literal["spectral", "components", "distance"] = Field(
-        default="spectral",
-        description="What groups are made from: spectral (the similarity), components (robots linked by similarities "
-        "above a threshold), distance (closeness alone).",
-    )
-    hysteresis: Hysteresis = Field(default=Hysteresis(), description="How steady groups on show are.")
-
-
 class GroupsReport(Report):
     """The grouping in force, and why."""
 
@@ -335,12 +252,20 @@ class EventReport(Report):
     id: int
     event: EventKind
     time: Time
-    robots: list[RobotId] = []
-    labels: list[str] = []
+    robots: list[RobotId] = Field(default=[])
+    labels: list[str] = Field(default=[])
     revision_before: int | None = None
     revision_after: int | None = None
     by: str | None = Field(default=None, description="Name of the token of whoever wanted it.")
     text: str
+
+
+class EventsMissed(Report):
+    """Events that a stream cannot give again: those from `first` to `last`, both included."""
+
+    first: int
+    last: int
+    reason: str = Field(examples=["older than what is kept"])
 
 
 class Gap(Report):
@@ -420,4 +345,4 @@ class Health(Report):
     """How the station is."""
 
     status: Literal["ready", "degraded", "starting", "stopping"]
-    parts: dict[str, PartHealth] = {}
+    parts: dict[str, PartHealth] = Field(default={})

@@ -8,15 +8,15 @@ import secrets
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
 
-from covista_schemas.reports import GroupBounds, Health, LiveSettings, PartHealth
+from covista_schemas.reports import Health, PartHealth
 from fastapi import FastAPI
 
+from covista_service import answers
 from covista_service.access import check_listening
 from covista_service.api import rest
 from covista_service.api.deps import Parts, State
 from covista_service.api.vitals import Vitals
 from covista_service.config import Settings
-from covista_service.grouping.hysteresis import HysteresisOptions
 from covista_service.grouping.warming import warm_up
 from covista_service.link.inbox import Inbox
 from covista_service.link.ingest import Ingest
@@ -25,7 +25,7 @@ from covista_service.link.publish import Publisher
 from covista_service.link.queries import Queries
 from covista_service.link.session import open_session
 from covista_service.loop import Loop
-from covista_service.station.options import GroupingOptions, StationOptions
+from covista_service.station.options import StationOptions
 from covista_service.station.station import Station
 from covista_service.store.database import check_url
 from covista_service.store.history import History
@@ -161,20 +161,5 @@ def _station_options(settings: Settings, capacity: int, revision: int) -> Statio
         unknown_after_s=settings.unknown_after_s,
         retry_after_s=settings.retry_after_s,
         revision=revision,
-        grouping=_grouping_options(settings.live),
-    )
-
-
-def _grouping_options(live: LiveSettings) -> GroupingOptions:
-    groups = live.groups
-    bounds = (groups.min, groups.max) if isinstance(groups, GroupBounds) else groups
-    return GroupingOptions(
-        alpha=live.alpha,
-        groups=bounds,
-        min_group_size=live.min_group_size,
-        sigma=live.sigma,
-        criterion=live.criterion,
-        grouping=live.grouping,
-        hysteresis=HysteresisOptions(live.hysteresis.gain, live.hysteresis.persistence_s),
-        smoothing=live.hysteresis.smoothing,
+        grouping=answers.grouping_options(settings.live),
     )

@@ -9,14 +9,14 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
-from contextlib import nullcontext
-from dataclasses import dataclass
+from contextlib import nullcontext, suppress
+from dataclasses import dataclass, field
 from typing import Protocol, TypeVar
 
 from covista_schemas.errors import DecodeError
-from covista_schemas.reports import EventReport
+from covista_schemas.reports import EventReport, LiveSettings
 
-from covista_service.answers import event_report
+from covista_service.answers import event_report, live_settings
 from covista_service.perception.camera import Features
 from covista_service.perception.comparison import Comparison
 from covista_service.perception.scene import Evidence, Settled
@@ -36,6 +36,7 @@ from covista_service.station.events import (
     MessageDropped,
     MessagesReceived,
     PoseArrived,
+    SettingsGiven,
     SurfacesBuilt,
     SurveyDone,
     SurveyPair,
@@ -120,13 +121,16 @@ class Crew(Protocol):
 class News:
     """What the world should hear of: what happened, and whether a new revision of the groups stands.
 
-    `robots` are those whose own group is not what they were told last.
+    `robots` are those whose own group is not what they were told last. `settings` are those in force since somebody
+    gave others, in a flat `patch` such as {"hysteresis.gain": 0.1}: there may be no event, where they are the same.
     """
 
     snapshot: Snapshot
     events: tuple[EventReport, ...]
     groups_changed: bool
     robots: tuple[str, ...]
+    settings: LiveSettings | None = None
+    patch: Mapping[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,11 +183,9 @@ class Loop:
         self._asyncio = asyncio.get_running_loop()
         self._source.attach(self.wake)
         while True:
-            try:
+            with suppress(TimeoutError):
                 async with asyncio.timeout(self._rest_s()):
                     await self._awake.wait()
-            except TimeoutError:
-                pass
             self._awake.clear()
             try:
                 with self._telemetry.timed("turn"):
@@ -202,12 +204,11 @@ class Loop:
         # Before anything is taken in: a crew that cannot tell must not cost a batch.
         self._resize()
         events, self._next_ns = self._source.drain(BATCH, began_ns)
-        effects: list[Effect] = []
-        done, self._done = self._done, []
+        effects, done, self._done = list[Effect](), self._done, []
         results = [self._results.popleft() for _ in range(len(self._results))]
         for event in itertools.chain(results, events, (Tick(),)):
             effects += self._receive(event)
-        self._tell(effects)
+        self._tell(effects, [event for event in results if isinstance(event, SettingsGiven)])
         for each in done:
             if not each.done():
                 each.set_result(None)
@@ -343,14 +344,16 @@ class Loop:
             self._results.append(event_of(done))
             self.wake()
 
-    def _tell(self, effects: Sequence[Effect]) -> None:
+    def _tell(self, effects: Sequence[Effect], given: Sequence[SettingsGiven]) -> None:
         changes = [effect for effect in effects if isinstance(effect, GroupsChanged)]
         happened = [effect for effect in effects if isinstance(effect, Happened)]
-        if not changes and not happened:
+        if not changes and not happened and not given:
             return
         events = tuple(event_report(next(self._event_ids), each) for each in happened)
         robots = tuple(dict.fromkeys(robot for change in changes for robot in change.robots))
-        news = News(self.snapshot(), events, bool(changes), robots)
+        patch = {name: value for each in given for name, value in each.patch.items()}
+        live = live_settings(given[-1].options) if given else None
+        news = News(self.snapshot(), events, bool(changes), robots, live, patch)
         for sink in self._sinks:
             sink.take(news)
 

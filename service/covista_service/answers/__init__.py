@@ -10,21 +10,28 @@ from covista_service.answers.grouping import (
 from covista_service.answers.pairs import common_regions, explaining_survey, find_pair, pair_report, pairs_report
 from covista_service.answers.pieces import pairs_json, similarity_json
 from covista_service.answers.robots import find_robot, robot_report, robots_report
+from covista_service.answers.settings import Patch, changes, flat, grouping_options, live_settings, patched
 from covista_service.answers.unknown import NotKnownError, problem_of
 
 __all__ = [
     "NotKnownError",
+    "Patch",
+    "changes",
     "common_regions",
     "event_report",
     "explaining_survey",
     "find_pair",
     "find_robot",
+    "flat",
     "group_report",
+    "grouping_options",
     "groups_report",
+    "live_settings",
     "own_group_report",
     "pair_report",
     "pairs_json",
     "pairs_report",
+    "patched",
     "problem_of",
     "robot_report",
     "robots_report",

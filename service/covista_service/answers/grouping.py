@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from covista_schemas import reports
 
+from covista_service.answers.settings import live_settings
 from covista_service.answers.unknown import NotKnownError
 from covista_service.station.events import Happened
-from covista_service.station.options import GroupingOptions
 from covista_service.station.snapshot import Snapshot
 
 
@@ -38,7 +38,7 @@ def groups_report(snapshot: Snapshot) -> reports.GroupsReport:
         scores=[reports.Score(groups=groups, score=score) for groups, score in view.scores],
         note=view.note,
         waiting=list(view.waiting),
-        settings=_live_settings(view.settings),
+        settings=live_settings(view.settings),
     )
 
 
@@ -74,21 +74,4 @@ def event_report(number: int, happened: Happened) -> reports.EventReport:
         revision_after=happened.revision_after,
         by=happened.by,
         text=happened.text,
-    )
-
-
-def _live_settings(options: GroupingOptions) -> reports.LiveSettings:
-    groups = options.groups
-    return reports.LiveSettings(
-        alpha=options.alpha,
-        groups=reports.GroupBounds(min=groups[0], max=groups[1]) if isinstance(groups, tuple) else groups,
-        min_group_size=options.min_group_size,
-        sigma=options.sigma,
-        criterion=options.criterion,
-        grouping=options.grouping,
-        hysteresis=reports.Hysteresis(
-            gain=options.hysteresis.gain,
-            persistence_s=options.hysteresis.persistence_s,
-            smoothing=options.smoothing,
-        ),
     )

@@ -43,7 +43,7 @@ def pairs_json(snapshot: Snapshot, min_overlap: float | None = None) -> Iterator
             comma = b","
         if looked % _PAIRS_AT_A_TIME == 0:
             time.sleep(0)
-    yield b"]}"
+    yield b'],"next":null}'
 
 
 def _rows(matrix: Floats) -> Iterator[bytes]:

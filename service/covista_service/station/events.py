@@ -150,11 +150,15 @@ class SurfacesBuilt:
 
 @dataclass(frozen=True, slots=True)
 class SettingsGiven:
-    """The live settings are to be these from now on; `text` says what changes, `by` who wants it."""
+    """The live settings are to be these from now on; `text` says what changes, `by` who wants it.
+
+    `patch` is what was asked for, by name, as JSON has it: for whoever writes it down.
+    """
 
     options: GroupingOptions
     text: str
     by: str | None = None
+    patch: Mapping[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

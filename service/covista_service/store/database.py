@@ -1,4 +1,4 @@
-"""How databases are opened."""
+"""How databases are opened: nobody waits for one for longer than seconds."""
 
 from __future__ import annotations
 
@@ -6,18 +6,23 @@ from pathlib import Path
 from typing import Any
 
 from covista_schemas.errors import CovistaError
-from sqlalchemy import Engine, create_engine, event
-from sqlalchemy.exc import ArgumentError, NoSuchModuleError
+from sqlalchemy import URL, Connection, Engine, create_engine, event
+from sqlalchemy.exc import ArgumentError, DBAPIError, DisconnectionError, NoSuchModuleError, SQLAlchemyError
 
-# How long a write waits for another process that has the file locked.
-_BUSY_MS = 1000
-
+# How long a statement waits for another process that has the file, or the table, locked.
+WAIT_S = 1.0
+# A server that says nothing for so long is given up.
+SILENCE_S = 4.0
+CONNECT_S = 3
 
 _SETTING = "setting database (--database, COVISTA_DATABASE)"
+# A file of SQLite is cut back to this when it has been written into the database, which is done every so many pages.
+_LOG_BYTES = 1 << 20
+_LOG_PAGES = 256
 
 
 class DatabaseError(CovistaError):
-    """A database URL that no engine can be made of."""
+    """A database that cannot be used as it is: its URL, or its schema."""
 
 
 def check_url(url: str) -> None:
@@ -25,10 +30,10 @@ def check_url(url: str) -> None:
     open_engine(url).dispose()
 
 
-def open_engine(url: str) -> Engine:
-    """An engine for `url`; nothing is connected yet. Raises DatabaseError."""
+def open_engine(url: str, *, reads: bool = False) -> Engine:
+    """An engine for `url`, which `reads` only or writes; nothing is connected yet. Raises DatabaseError."""
     try:
-        engine = create_engine(url, pool_pre_ping=True)
+        engine = create_engine(url, pool_pre_ping=True, pool_timeout=WAIT_S)
     except (ImportError, NoSuchModuleError) as error:
         raise DatabaseError(
             f"{_SETTING}: no driver for it: {error}; PostgreSQL needs pip install 'covista[scale]'"
@@ -36,21 +41,104 @@ def open_engine(url: str) -> Engine:
     except (ArgumentError, TypeError, ValueError) as error:
         raise DatabaseError(f"{_SETTING}: options that make no sense: {error}") from error
     if engine.dialect.name == "sqlite":
-        event.listen(engine, "connect", _prepare_sqlite)
+        _prepare_sqlite(engine, reads=reads)
+    elif engine.dialect.driver == "psycopg":
+        _prepare_postgresql(engine, reads=reads)
     return engine
+
+
+def file_of(url: URL) -> Path | None:
+    """The file that a database of SQLite lies in; None for one that lies in none."""
+    plain = url.get_backend_name() == "sqlite" and url.database and not url.database.startswith(("file:", ":memory:"))
+    return Path(str(url.database)) if plain else None
 
 
 def file_is_gone(engine: Engine) -> bool:
     """Whether the engine's database is a file of SQLite that is not there, or not any more."""
-    url = engine.url
-    plain = engine.dialect.name == "sqlite" and url.database and not url.database.startswith(("file:", ":memory:"))
-    return bool(plain) and not Path(str(url.database)).exists()
+    file = file_of(engine.url)
+    return file is not None and not file.exists()
 
 
-def _prepare_sqlite(connection: Any, _record: object) -> None:
+def first_line(error: Exception) -> str:
+    """What went wrong, without what SQLAlchemy adds: the statement, and a link below it."""
+    said = str(error.orig) if isinstance(error, DBAPIError) and error.orig is not None else str(error)
+    lines = said.strip().splitlines()
+    return lines[0] if lines else type(error).__name__
+
+
+def _prepare_sqlite(engine: Engine, *, reads: bool) -> None:
     """Readers and the writer do not block each other, and a crash of the process loses nothing that was committed."""
-    cursor = connection.cursor()
-    cursor.execute(f"PRAGMA busy_timeout = {_BUSY_MS}")
-    cursor.execute("PRAGMA journal_mode = WAL")
-    cursor.execute("PRAGMA synchronous = NORMAL")
-    cursor.close()
+    file = file_of(engine.url)
+    pragmas = [f"busy_timeout = {round(1000 * WAIT_S)}", "synchronous = NORMAL"]
+    if reads:
+        pragmas.append("query_only = ON")
+    else:
+        pragmas += ["auto_vacuum = INCREMENTAL", "journal_mode = WAL"]
+        pragmas += [f"journal_size_limit = {_LOG_BYTES}", f"wal_autocheckpoint = {_LOG_PAGES}"]
+
+    @event.listens_for(engine, "connect")
+    def _connected(connection: Any, record: Any) -> None:
+        # Transactions are begun below, so that tables are made in them too.
+        connection.isolation_level = None
+        cursor = connection.cursor()
+        for pragma in pragmas:
+            cursor.execute(f"PRAGMA {pragma}")
+        cursor.close()
+        record.info["file"] = _identity(file)
+
+    @event.listens_for(engine, "checkout")
+    def _taken(_connection: Any, record: Any, _proxy: Any) -> None:
+        # Otherwise SQLite would go on with the file that has no name any more.
+        if record.info.get("file") != _identity(file):
+            raise DisconnectionError("the file is another one")
+
+    @event.listens_for(engine, "begin")
+    def _begun(connection: Connection) -> None:
+        connection.exec_driver_sql("BEGIN" if reads else "BEGIN IMMEDIATE")
+
+
+def _identity(file: Path | None) -> tuple[int, int] | None:
+    """Which file it is, whatever its name."""
+    try:
+        found = file.stat() if file else None
+    except OSError:
+        return None
+    return None if found is None else (found.st_dev, found.st_ino)
+
+
+def _prepare_postgresql(engine: Engine, *, reads: bool) -> None:
+    """A server that is stopped, or behind a cable that was cut, is noticed within seconds."""
+    import psycopg
+
+    class Impatient(psycopg.Connection[Any]):
+        """Gives up on a server that does not answer: the driver alone would wait for ever."""
+
+        def wait(self, gen: Any, interval: float = 0.1, timeout: float | None = SILENCE_S) -> Any:
+            """What comes of a generator of the driver's; TimeoutError of its own kind if that takes too long."""
+            try:
+                return super().wait(gen, interval, timeout)
+            except psycopg.errors._WaitTimeout as error:
+                self.pgconn.finish()
+                raise psycopg.OperationalError(f"no answer for {SILENCE_S:g} s") from error
+
+    milliseconds = round(1000 * WAIT_S)
+    options = [f"statement_timeout={round(1000 * SILENCE_S) - 500}", f"lock_timeout={milliseconds}"]
+    if reads:
+        options.append("default_transaction_read_only=on")
+    usual: dict[str, Any] = {
+        "connect_timeout": CONNECT_S,
+        "options": " ".join(f"-c {option}" for option in options),
+        "keepalives_idle": 2,
+        "keepalives_interval": 1,
+        "keepalives_count": 2,
+        "tcp_user_timeout": 4000,
+        "application_name": "covista",
+    }
+
+    @event.listens_for(engine, "do_connect")
+    def _connecting(_dialect: Any, _record: Any, arguments: Any, parameters: dict[str, Any]) -> Any:
+        # What the URL says goes first.
+        return Impatient.connect(*arguments, **(usual | parameters))
+
+
+UNUSABLE = (SQLAlchemyError, OSError)

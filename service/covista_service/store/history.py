@@ -12,9 +12,10 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from covista_service import answers
 from covista_service.loop import News, SinkStatus
-from covista_service.store import tables
 from covista_service.store.database import file_is_gone, open_engine
-from covista_service.store.tables import Entry, LastNumbers
+from covista_service.store.migrations import upgrade
+from covista_service.store.numbers import LastNumbers, read_last_numbers
+from covista_service.store.rows import Entry, write
 from covista_service.telemetry import about
 
 QUEUE = 10_000
@@ -84,8 +85,8 @@ class History:
     def _read_last(self) -> LastNumbers:
         try:
             with self._engine.begin() as connection:
-                tables.metadata.create_all(connection)
-                last = tables.read_last_numbers(connection)
+                upgrade(connection)
+                last = read_last_numbers(connection)
         except (SQLAlchemyError, OSError) as error:
             self._fail(error)
             return LastNumbers()
@@ -118,8 +119,8 @@ class History:
         try:
             with self._engine.begin() as connection:
                 if not self._prepared:
-                    tables.metadata.create_all(connection)
-                tables.write(connection, batch)
+                    upgrade(connection)
+                write(connection, batch)
         except (SQLAlchemyError, OSError) as error:
             self._fail(error)
             self._put_back(batch)

@@ -1,23 +1,29 @@
-"""What is stored, and how it is written."""
+"""What is stored. Times are microseconds (_us) since the epoch, or nanoseconds (_ns) where a robot has named them so.
+
+A change here needs a new revision in `migrations`; a test holds the two against each other.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from datetime import UTC, datetime
-
-from covista_schemas.reports import EventReport, GroupsReport
-from sqlalchemy import BigInteger, Column, Connection, Integer, MetaData, String, Table, Text, func, insert, select
+from sqlalchemy import BigInteger, Column, Double, Index, Integer, MetaData, String, Table, Text
 
 metadata = MetaData()
 
 # A key of our own: numbers may come twice if a database was out of reach when the station started.
-_KEY = BigInteger().with_variant(Integer, "sqlite")
+KEY = BigInteger().with_variant(Integer, "sqlite")
+ID = String(63)
+POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
+
+
+def _pose(*, nullable: bool) -> list[Column[float]]:
+    """Position of a camera in metres and its orientation, the unit quaternion world_from_camera."""
+    return [Column(name, Double, nullable=nullable) for name in POSE]
+
 
 group_revisions = Table(
     "group_revisions",
     metadata,
-    Column("id", _KEY, primary_key=True, autoincrement=True),
+    Column("id", KEY, primary_key=True, autoincrement=True),
     Column("revision", BigInteger, nullable=False, index=True),
     Column("time_us", BigInteger, nullable=False, index=True),
     Column("report", Text, nullable=False),
@@ -26,55 +32,116 @@ group_revisions = Table(
 events = Table(
     "events",
     metadata,
-    Column("id", _KEY, primary_key=True, autoincrement=True),
+    Column("id", KEY, primary_key=True, autoincrement=True),
     Column("number", BigInteger, nullable=False, index=True),
     Column("time_us", BigInteger, nullable=False, index=True),
     Column("kind", String(32), nullable=False),
     Column("report", Text, nullable=False),
+    Index("ix_events_kind_time_us", "kind", "time_us"),
 )
 
-Entry = GroupsReport | EventReport
-_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+tracks = Table(
+    "tracks",
+    metadata,
+    Column("id", KEY, primary_key=True, autoincrement=True),
+    Column("robot", ID, nullable=False),
+    Column("time_us", BigInteger, nullable=False),
+    *_pose(nullable=False),
+    Index("ix_tracks_robot_time_us", "robot", "time_us"),
+)
 
+# The smaller id is a.
+pair_overlaps = Table(
+    "pair_overlaps",
+    metadata,
+    Column("id", KEY, primary_key=True, autoincrement=True),
+    Column("a", ID, nullable=False),
+    Column("b", ID, nullable=False),
+    Column("time_us", BigInteger, nullable=False),
+    Column("overlap_a", Double),
+    Column("overlap_b", Double),
+    Column("found_by", String(16), nullable=False),
+    Index("ix_pair_overlaps_a_b_time_us", "a", "b", "time_us"),
+)
 
-@dataclass(frozen=True, slots=True)
-class LastNumbers:
-    """The highest revision and event number stored; 0 for none."""
+settings_changes = Table(
+    "settings_changes",
+    metadata,
+    Column("id", KEY, primary_key=True, autoincrement=True),
+    Column("time_us", BigInteger, nullable=False),
+    Column("by", ID),
+    Column("patch", Text, nullable=False),
+    Column("settings", Text, nullable=False),
+)
 
-    revision: int = 0
-    event: int = 0
+gaps = Table(
+    "gaps",
+    metadata,
+    Column("id", KEY, primary_key=True, autoincrement=True),
+    Column("since_us", BigInteger, nullable=False),
+    Column("until_us", BigInteger, nullable=False, index=True),
+    Column("lost", BigInteger, nullable=False),
+    Column("reason", Text, nullable=False),
+)
 
+# Up to which number names may have been used.
+numbers = Table(
+    "numbers",
+    metadata,
+    Column("name", String(32), primary_key=True),
+    Column("reserved", BigInteger, nullable=False),
+)
 
-def read_last_numbers(connection: Connection) -> LastNumbers:
-    """Where numbering stood when the station was last running."""
-    revision = connection.execute(select(func.max(group_revisions.c.revision))).scalar()
-    event = connection.execute(select(func.max(events.c.number))).scalar()
-    return LastNumbers(revision or 0, event or 0)
+# What a station that starts remembers: the last state of robots and pairs, and the keyframes that they name.
+robots_now = Table(
+    "robots_now",
+    metadata,
+    Column("robot", ID, primary_key=True),
+    Column("last_seen_ns", BigInteger, nullable=False),
+    Column("boot", Text),
+    Column("pose_time_ns", BigInteger),
+    *_pose(nullable=True),
+    Column("keyframe_boot", Text),
+    Column("keyframe_sequence", BigInteger),
+)
 
+keyframes_now = Table(
+    "keyframes_now",
+    metadata,
+    Column("robot", ID, primary_key=True),
+    Column("boot", Text, primary_key=True),
+    Column("sequence", BigInteger, primary_key=True, autoincrement=False),
+    Column("time_ns", BigInteger, nullable=False),
+    Column("arrived_ns", BigInteger, nullable=False),
+    Column("camera", Text, nullable=False),
+    *_pose(nullable=False),
+)
 
-def write(connection: Connection, entries: Sequence[Entry]) -> None:
-    """Append entries."""
-    revisions = [_revision(entry) for entry in entries if isinstance(entry, GroupsReport)]
-    happened = [_event(entry) for entry in entries if isinstance(entry, EventReport)]
-    if revisions:
-        connection.execute(insert(group_revisions), revisions)
-    if happened:
-        connection.execute(insert(events), happened)
+pairs_now = Table(
+    "pairs_now",
+    metadata,
+    Column("a", ID, primary_key=True),
+    Column("b", ID, primary_key=True),
+    Column("computed_ns", BigInteger, nullable=False),
+    Column("overlap_a", Double, nullable=False),
+    Column("overlap_b", Double, nullable=False),
+    *[Column(name, Double) for name in ("low_a", "high_a", "low_b", "high_b")],
+    Column("boot_a", Text, nullable=False),
+    Column("sequence_a", BigInteger, nullable=False),
+    Column("boot_b", Text, nullable=False),
+    Column("sequence_b", BigInteger, nullable=False),
+    Column("pose_time_a_ns", BigInteger),
+    Column("pose_time_b_ns", BigInteger),
+)
 
-
-def _revision(entry: GroupsReport) -> dict[str, object]:
-    return {"revision": entry.revision, "time_us": _microseconds(entry.time), "report": entry.model_dump_json()}
-
-
-def _event(entry: EventReport) -> dict[str, object]:
-    return {
-        "number": entry.id,
-        "time_us": _microseconds(entry.time),
-        "kind": entry.event.value,
-        "report": entry.model_dump_json(),
-    }
-
-
-def _microseconds(time: datetime) -> int:
-    since = time - _EPOCH
-    return (since.days * 86_400 + since.seconds) * 1_000_000 + since.microseconds
+tokens = Table(
+    "tokens",
+    metadata,
+    Column("id", Integer, primary_key=True, autoincrement=True),
+    Column("name", ID, nullable=False, unique=True),
+    Column("digest", String(64), nullable=False, unique=True),
+    Column("scopes", String(64), nullable=False),
+    Column("created_us", BigInteger, nullable=False),
+    Column("revoked_us", BigInteger),
+    Column("last_used_us", BigInteger),
+)
