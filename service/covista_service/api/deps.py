@@ -11,6 +11,7 @@ from covista_schemas.keys import ID_PATTERN
 from covista_schemas.reports import Health, Report
 from fastapi import Depends, Path, Request, Response
 
+from covista_service.access import Gate
 from covista_service.api.delivery import deliver
 from covista_service.api.outgoing import Outgoing
 from covista_service.api.vitals import Vitals
@@ -24,13 +25,17 @@ JSON = "application/json"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Parts:
-    """What the routes need of the station. `name` changes with each start, so that no answer is mistaken for newer."""
+    """What the routes need of the station. `name` changes with each start, so that no answer is mistaken for newer.
+
+    `gate` says who may ask.
+    """
 
     loop: Loop
     telemetry: Telemetry
     health: Callable[[], Health]
     vitals: Callable[[], Vitals]
     name: str
+    gate: Gate
     outgoing: Outgoing = field(default_factory=Outgoing)
 
 

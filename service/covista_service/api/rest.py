@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib.metadata import version
 
 from fastapi import APIRouter, FastAPI
+from starlette.middleware.cors import CORSMiddleware
 from starlette.types import ASGIApp, Lifespan, Receive, Scope, Send
 
 from covista_service.api import contract, errors, groups, health, pairs, robots, similarity
+from covista_service.api.bodies import bounded
+from covista_service.api.guard import guarded
 from covista_service.api.timing import PREFIX, timed
 
+_METHODS = ("GET", "HEAD", "POST", "PATCH", "DELETE")
+_ASKED_WITH = ("authorization", "content-type", "if-none-match", "last-event-id")
+_TOLD = ("etag", "link", "retry-after", "www-authenticate")
 
-def build(lifespan: Lifespan[FastAPI] | None = None) -> FastAPI:
-    """The application; its state, `deps.State`, is what `lifespan` yields."""
+
+def build(lifespan: Lifespan[FastAPI] | None = None, cors_origins: Sequence[str] = ()) -> FastAPI:
+    """The application; its state, `deps.State`, is what `lifespan` yields. Pages of `cors_origins` may ask it."""
     app = FastAPI(
         title="Covista",
         version=version("covista"),
@@ -26,6 +34,18 @@ def build(lifespan: Lifespan[FastAPI] | None = None) -> FastAPI:
     app.include_router(nouns)
     app.include_router(health.router)
     errors.install(app)
+    # The last one added is the first to hear of a request.
+    app.add_middleware(bounded)
+    app.add_middleware(guarded)
+    if cors_origins:
+        # Outside of the guard: browsers ask first, without a token, and pages are to read why they stay out.
+        app.add_middleware(
+            CORSMiddleware,
+            allow_origins=list(cors_origins),
+            allow_methods=_METHODS,
+            allow_headers=_ASKED_WITH,
+            expose_headers=_TOLD,
+        )
     app.add_middleware(timed)
     app.add_middleware(_head_as_get)
     # FastAPI's way to replace its own description is to assign the method.

@@ -6,6 +6,7 @@ from typing import Any
 import httpx
 import pytest
 from covista_schemas.reports import Health, PartHealth
+from covista_service.access import Gate, Keyring
 from covista_service.api import rest
 from covista_service.api.deps import Parts
 from covista_service.api.vitals import Vitals
@@ -28,6 +29,13 @@ class Silence:
         return (), None
 
 
+def open_gate(*, any_host: bool) -> Gate:
+    """A gate of a station without tokens."""
+    keyring = Keyring()
+    keyring.take([])
+    return Gate(keyring, any_host=any_host)
+
+
 @dataclass
 class Desk:
     """The REST interface of a scene's station, without a network."""
@@ -46,11 +54,13 @@ class Desk:
     )
     health: Health = field(default_factory=lambda: Health(status="ready", parts={"link": PartHealth(status="ready")}))
 
+    gate: Gate = field(default_factory=lambda: open_gate(any_host=True))
+
     def __post_init__(self) -> None:
         self.app = rest.build()
         telemetry = Telemetry()
         loop = Loop(self.scene.station, Silence(), Hands(), [], telemetry, clock=lambda: self.scene.now_ns)
-        self.parts = Parts(loop, telemetry, lambda: self.health, lambda: self.vitals, "test")
+        self.parts = Parts(loop, telemetry, lambda: self.health, lambda: self.vitals, "test", self.gate)
 
     async def _stateful(self, scope: dict[str, Any], receive: Any, send: Any) -> None:
         scope["state"] = {"parts": self.parts}
