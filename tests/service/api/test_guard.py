@@ -1,6 +1,7 @@
 """Every route against every kind of token."""
 
 import json
+import re
 from typing import Any
 
 import pytest
@@ -39,6 +40,11 @@ class Guarded:
         keyring.take(shelf.read())
         self.desk = Desk(gate=Gate(keyring, Attempts(most)))
 
+    @property
+    def strangers(self) -> list[str | None]:
+        """What lets nobody in."""
+        return [None, "", "x", new_secret(), self.revoked]
+
     def ask(self, path: str, token: str | None = None, method: str = "GET") -> Any:
         return self.desk.ask(path, method, **({} if token is None else {"authorization": f"Bearer {token}"}))
 
@@ -65,12 +71,30 @@ def test_what_is_open_is_so_with_and_without_any_token(guarded: Guarded, path: s
 @pytest.mark.parametrize("method", ["GET", "HEAD"])
 @pytest.mark.parametrize("path", ASKED)
 def test_to_ask_takes_a_token_that_may_read(guarded: Guarded, path: str, method: str) -> None:
-    for token in (None, "", "x", new_secret(), guarded.revoked):
+    for token in guarded.strangers:
         response = guarded.ask(path, token, method)
         assert response.status_code == 401
         assert response.headers["www-authenticate"].startswith('Bearer realm="covista"')
     for token in (guarded.reader, guarded.operator):
         assert guarded.ask(path, token, method).status_code in (200, 404)
+
+
+def test_every_operation_of_the_description_is_guarded_as_it_says() -> None:
+    guarded = Guarded()
+    for path, methods in guarded.ask("/openapi.json").json()["paths"].items():
+        asked = re.sub(r"\{\w+\}", "nobody", path)
+        for method, operation in methods.items():
+            wanted = [scope for need in operation["security"] for scopes in need.values() for scope in scopes]
+            if not wanted:
+                assert path in OPEN
+                continue
+            outside = [guarded.ask(asked, token, method.upper()).status_code for token in guarded.strangers]
+            assert outside == [401] * len(outside), (method, path)
+            if wanted == ["operate"]:
+                assert guarded.ask(asked, guarded.reader, method.upper()).status_code == 403, (method, path)
+            # What streams would not end here.
+            elif "text/event-stream" not in operation["responses"].get("200", {}).get("content", {}):
+                assert guarded.ask(asked, guarded.reader, method.upper()).status_code not in (401, 403), (method, path)
 
 
 @pytest.mark.parametrize(("method", "path"), CHANGES)
