@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import secrets
+import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager, closing, suppress
 
@@ -27,8 +28,10 @@ from covista_service.link.session import open_session
 from covista_service.loop import Loop
 from covista_service.station.options import StationOptions
 from covista_service.station.station import Station
+from covista_service.store.archive import Archive
 from covista_service.store.database import check_url
 from covista_service.store.history import History
+from covista_service.store.retention import Retention
 from covista_service.store.tokens import Tokens
 from covista_service.telemetry import Telemetry, about
 from covista_service.workers import Workers, WorkersOptions, check_kind, daemon
@@ -81,23 +84,30 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
         close_later(Ingest(session, settings.site, mailboxes).close)
         publisher = Publisher(session, settings.site)
         close_later(publisher.close)
-        history = await asyncio.to_thread(History, settings.database)
+        archive = Archive(settings.database)
+        close_later(archive.close)
+        retention = Retention(settings.retention_days, settings.retention_mb)
+        history = await asyncio.to_thread(lambda: History(settings.database, retention=retention))
         close_later(history.close)
         gate, watch = await asyncio.to_thread(_open_gate, settings, close_later)
         telemetry = Telemetry()
         options = WorkersOptions(settings.workers, settings.workers_count)
         workers = await asyncio.to_thread(Workers, options, telemetry.took)
         close_later(workers.close)
+        station = Station(_station_options(settings, workers.capacity))
+        memory = await asyncio.to_thread(history.recall, settings.forget_after_s, settings.unknown_after_s)
+        station.restore(memory, time.time_ns())
         loop = Loop(
-            Station(_station_options(settings, workers.capacity, history.last.revision)),
+            station,
             Inbox(mailboxes),
             workers,
             (publisher, history),
             telemetry,
-            next_event=history.last.event + 1,
+            next_event=memory.event + 1,
         )
         task = asyncio.create_task(_run(loop), name="covista-loop")
         stack.push_async_callback(_end, task)
+        history.follow(loop.ask)
         close_later(Queries(session, settings.site, loop.ask).close)
         link = PartHealth(status="ready", detail=", ".join((*settings.link, *settings.connect)))
 
@@ -174,7 +184,7 @@ def _health(parts: dict[str, PartHealth]) -> Health:
     return Health(status="ready", parts=parts)
 
 
-def _station_options(settings: Settings, capacity: int, revision: int) -> StationOptions:
+def _station_options(settings: Settings, capacity: int) -> StationOptions:
     return StationOptions(
         capacity=capacity,
         live_after_s=settings.live_after_s,
@@ -183,6 +193,5 @@ def _station_options(settings: Settings, capacity: int, revision: int) -> Statio
         decay_after_s=settings.decay_after_s,
         unknown_after_s=settings.unknown_after_s,
         retry_after_s=settings.retry_after_s,
-        revision=revision,
         grouping=answers.grouping_options(settings.live),
     )

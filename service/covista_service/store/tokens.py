@@ -24,7 +24,7 @@ class Tokens:
     """
 
     def __init__(self, url: str) -> None:
-        self._url = url
+        self.url = url
         self._reader = open_engine(url, reads=True)
 
     def read(self) -> Sequence[Token]:
@@ -74,7 +74,7 @@ class Tokens:
 
     @contextmanager
     def _writing(self) -> Iterator[Connection]:
-        engine = open_engine(self._url)
+        engine = open_engine(self.url)
         try:
             with _using(engine) as connection:
                 yield connection

@@ -1,5 +1,6 @@
 """Tokens in databases of each kind."""
 
+import asyncio
 import sqlite3
 import time
 from collections.abc import Iterator
@@ -7,11 +8,14 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from covista_service.access import Scope, TokenError
-from covista_service.access.tokens import digest_of, find, is_shaped
+from covista_service.access import Admitted, Gate, Keyring, Refusal, Refused, Scope, TokenError, TokenWatch
+from covista_service.access.tokens import digest_of, find, is_shaped, new_secret
 from covista_service.store.database import open_engine
 from covista_service.store.tokens import Tokens
 from sqlalchemy import text
+
+from tests.service.deadline import wait_until
+from tests.service.store.server import Server
 
 READ, OPERATE = frozenset({Scope.READ}), frozenset({Scope.OPERATE})
 
@@ -123,3 +127,31 @@ def test_a_server_that_is_not_there_is_one_line() -> None:
         tokens.read()
     assert "\n" not in str(caught.value)
     assert "hush" not in str(caught.value)
+
+
+def test_a_server_that_hangs_and_is_gone_holds_nobody_up_and_is_found_again(server: Server) -> None:
+    keyring = Keyring()
+    with closing(Tokens(server.new_database())) as tokens:
+        secret, doomed = tokens.add("a", READ), tokens.add("b", READ)
+        with closing(TokenWatch(tokens, keyring, every_s=0.05)) as watch:
+            gate = Gate(keyring, news=watch.news)
+
+            def come(secret: str) -> Admitted | Refused:
+                return asyncio.run(gate.admit([f"Bearer {secret}"], Scope.READ, "10.0.0.1"))
+
+            with server.frozen():
+                begun_s = time.monotonic()
+                assert come(secret) == Admitted("a")
+                assert come(new_secret()) == Refused(Refusal.UNKNOWN)
+                assert time.monotonic() - begun_s < 2
+                wait_until(lambda: watch.health().status == "degraded", "it says so", 20)
+                assert come(secret) == Admitted("a")
+            wait_until(lambda: watch.health().status == "ready", "it is well again", 20)
+            server.stop()
+            wait_until(lambda: watch.health().status == "degraded", "it says so", 20)
+            assert come(secret) == Admitted("a")
+            server.start()
+            with closing(Tokens(tokens.url)) as command:
+                wait_until(lambda: watch.health().status == "ready", "it is well again", 20)
+                command.revoke("b")
+            wait_until(lambda: come(doomed) == Refused(Refusal.REVOKED), "it is out")
