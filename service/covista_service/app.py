@@ -15,8 +15,9 @@ from covista_service import answers
 from covista_service.access import check_listening
 from covista_service.api import rest
 from covista_service.api.deps import Parts, State
+from covista_service.api.stream import Stream
 from covista_service.api.vitals import Vitals
-from covista_service.config import Settings
+from covista_service.config import Settings, with_stored
 from covista_service.grouping.warming import warm_up
 from covista_service.link.inbox import Inbox
 from covista_service.link.ingest import Ingest
@@ -27,6 +28,7 @@ from covista_service.link.session import open_session
 from covista_service.loop import Loop
 from covista_service.station.options import StationOptions
 from covista_service.station.station import Station
+from covista_service.store.archive import Archive
 from covista_service.store.database import check_url
 from covista_service.store.history import History
 from covista_service.telemetry import Telemetry, about
@@ -71,6 +73,10 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
         close_later(publisher.close)
         history = await asyncio.to_thread(History, settings.database)
         close_later(history.close)
+        archive = Archive(settings.database)
+        close_later(archive.close)
+        settings = with_stored(settings, {})
+        stream = Stream(history.last.event + 1)
         telemetry = Telemetry()
         options = WorkersOptions(settings.workers, settings.workers_count)
         workers = await asyncio.to_thread(Workers, options, telemetry.took)
@@ -79,7 +85,7 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
             Station(_station_options(settings, workers.capacity, history.last.revision)),
             Inbox(mailboxes),
             workers,
-            (publisher, history),
+            (publisher, history, stream),
             telemetry,
             next_event=history.last.event + 1,
         )
@@ -103,7 +109,16 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
             )
 
         log.info("starts", extra=about(**settings.shown))
-        yield Parts(loop, telemetry, health_now, vitals_now, secrets.token_hex(4))
+        yield Parts(
+            loop,
+            telemetry,
+            health_now,
+            vitals_now,
+            secrets.token_hex(4),
+            archive=archive,
+            flush=lambda _: True,
+            stream=stream,
+        )
         log.info("stops", extra=about(surveys=telemetry.summary().surveys))
 
 

@@ -1,4 +1,5 @@
 import asyncio
+import json
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
@@ -8,10 +9,12 @@ import pytest
 from covista_schemas.reports import Health, PartHealth
 from covista_service.api import rest
 from covista_service.api.deps import Parts
+from covista_service.api.stream import Stream
 from covista_service.api.vitals import Vitals
 from covista_service.link.mailbox import Depths
 from covista_service.loop import CrewStatus, Loop, SinkStatus
 from covista_service.station.events import Event
+from covista_service.store.archive import Archive
 from covista_service.telemetry import Telemetry
 
 from tests.service.hands import Hands
@@ -46,25 +49,53 @@ class Desk:
     )
     health: Health = field(default_factory=lambda: Health(status="ready", parts={"link": PartHealth(status="ready")}))
 
+    # Nobody keeps a history there.
+    database: str = "sqlite:////nowhere/covista.db"
+
     def __post_init__(self) -> None:
         self.app = rest.build()
         telemetry = Telemetry()
         loop = Loop(self.scene.station, Silence(), Hands(), [], telemetry, clock=lambda: self.scene.now_ns)
-        self.parts = Parts(loop, telemetry, lambda: self.health, lambda: self.vitals, "test")
+        self.archive = Archive(self.database)
+        self.parts = Parts(
+            loop,
+            telemetry,
+            lambda: self.health,
+            lambda: self.vitals,
+            "test",
+            archive=self.archive,
+            flush=lambda _: True,
+            stream=Stream(),
+        )
 
     async def _stateful(self, scope: dict[str, Any], receive: Any, send: Any) -> None:
         scope["state"] = {"parts": self.parts}
         await self.app(scope, receive, send)
 
-    def ask(self, path: str, method: str = "GET", **headers: str) -> httpx.Response:
-        """One request."""
+    def ask(self, path: str, method: str = "GET", content: str | None = None, **headers: str) -> httpx.Response:
+        """One request, while the station turns."""
 
         async def asking() -> httpx.Response:
             transport = httpx.ASGITransport(self._stateful, raise_app_exceptions=False)
             async with httpx.AsyncClient(transport=transport, base_url="http://station") as client:
-                return await client.request(method, path, headers=headers)
+                turning = asyncio.create_task(self._turn())
+                try:
+                    return await client.request(method, path, headers=headers, content=content)
+                finally:
+                    turning.cancel()
 
         return asyncio.run(asking())
+
+    async def _turn(self) -> None:
+        while True:
+            if self.parts.loop._done:
+                self.parts.loop.turn()
+            await asyncio.sleep(0)
+
+    def send(self, method: str, path: str, body: object, **headers: str) -> httpx.Response:
+        """One request with a body."""
+        headers = {"content-type": "application/json"} | headers
+        return self.ask(f"/api/v1{path}", method, body if isinstance(body, str) else json.dumps(body), **headers)
 
     def get(self, path: str, **headers: str) -> httpx.Response:
         """One question to the API."""
