@@ -49,6 +49,8 @@ class Desk:
     )
     health: Health = field(default_factory=lambda: Health(status="ready", parts={"link": PartHealth(status="ready")}))
 
+    # Name of the token that is asked with.
+    by: str | None = None
     # Nobody keeps a history there.
     database: str = "sqlite:////nowhere/covista.db"
 
@@ -70,6 +72,8 @@ class Desk:
 
     async def _stateful(self, scope: dict[str, Any], receive: Any, send: Any) -> None:
         scope["state"] = {"parts": self.parts}
+        if self.by is not None:
+            scope["covista.by"] = self.by
         await self.app(scope, receive, send)
 
     def ask(self, path: str, method: str = "GET", content: str | None = None, **headers: str) -> httpx.Response:
