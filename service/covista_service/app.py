@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import secrets
+import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
 
@@ -26,7 +27,7 @@ from covista_service.link.publish import Publisher
 from covista_service.link.queries import Queries
 from covista_service.link.session import open_session
 from covista_service.loop import Loop
-from covista_service.station.options import StationOptions
+        grouping=answers.grouping_options(settings.live),
 from covista_service.station.station import Station
 from covista_service.store.archive import Archive
 from covista_service.store.database import check_url
@@ -81,8 +82,10 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
         options = WorkersOptions(settings.workers, settings.workers_count)
         workers = await asyncio.to_thread(Workers, options, telemetry.took)
         close_later(workers.close)
+        station = Station(_station_options(settings, workers.capacity))
+        station.restore(Memory(revision=history.last.revision), time.time_ns())
         loop = Loop(
-            Station(_station_options(settings, workers.capacity, history.last.revision)),
+            station,
             Inbox(mailboxes),
             workers,
             (publisher, history, stream),
@@ -166,7 +169,7 @@ def _health(parts: dict[str, PartHealth]) -> Health:
     return Health(status="ready", parts=parts)
 
 
-def _station_options(settings: Settings, capacity: int, revision: int) -> StationOptions:
+def _station_options(settings: Settings, capacity: int) -> StationOptions:
     return StationOptions(
         capacity=capacity,
         live_after_s=settings.live_after_s,
@@ -175,6 +178,25 @@ def _station_options(settings: Settings, capacity: int, revision: int) -> Statio
         decay_after_s=settings.decay_after_s,
         unknown_after_s=settings.unknown_after_s,
         retry_after_s=settings.retry_after_s,
+<<<<<<< HEAD
         revision=revision,
         grouping=answers.grouping_options(settings.live),
+=======
+        grouping=_grouping_options(settings.live),
+    )
+
+
+def _grouping_options(live: LiveSettings) -> GroupingOptions:
+    groups = live.groups
+    bounds = (groups.min, groups.max) if isinstance(groups, GroupBounds) else groups
+    return GroupingOptions(
+        alpha=live.alpha,
+        groups=bounds,
+        min_group_size=live.min_group_size,
+        sigma=live.sigma,
+        criterion=live.criterion,
+        grouping=live.grouping,
+        hysteresis=HysteresisOptions(live.hysteresis.gain, live.hysteresis.persistence_s),
+        smoothing=live.hysteresis.smoothing,
+>>>>>>> h-core
     )

@@ -212,7 +212,7 @@ def test_a_bug_that_one_event_brings_to_light_does_not_stop_the_others(
 
 
 @pytest.mark.parametrize(
-    ("where", "what"), [("_groups", "evaluate"), ("_successors", "due"), ("_pairs", "expire"), ("_roster", "lapsed")]
+    ("where", "what"), [("_groups", "evaluate"), ("_keyframes", "due"), ("_pairs", "expire"), ("_roster", "lapsed")]
 )
 def test_a_part_of_a_tick_that_fails_keeps_no_job_from_the_workers(
     where: str, what: str, monkeypatch: pytest.MonkeyPatch

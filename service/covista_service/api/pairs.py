@@ -99,6 +99,8 @@ def _draw(view: PairView, drawn: str, other: str) -> bytes:
     keyframe = view.keyframe_a if first else view.keyframe_b
     if keyframe is None:
         raise NotKnownError("No picture", f"what {drawn!r} and {other!r} have in common is not known yet")
+    if keyframe.features is None:
+        raise NotKnownError("No picture", f"{drawn!r} has sent no keyframe since this station started")
     share = view.overlap_a if first else view.overlap_b
     words = "unknown" if share is None else f"{share:.0%}"
     caption = (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from covista_service.grouping.hysteresis import HysteresisOptions, Pending, Stan
 from covista_service.grouping.k_means import Labels, dense
 from covista_service.grouping.similarity import Floats
 from covista_service.station.events import Effect, GroupsChanged, Happened, Pair
+from covista_service.station.memory import Memory
 from covista_service.station.options import GroupingOptions, StationOptions, nanoseconds
 from covista_service.station.proposal import Proposal, propose
 from covista_service.station.snapshot import GroupsView, GroupView, Reason, SimilarityView
@@ -37,16 +38,17 @@ class Groups:
         self._label_of: dict[str, str] = {}
         # Rows of the similarity that was evaluated last.
         self._rows: dict[str, int] = {}
-        self._next_label = 1
         # Changes that settings propose and that are not shown yet.
         self._pending: tuple[Pending, ...] = ()
         # News of robots or settings is evaluated at once, drift of positions and overlaps a few times a second.
         self._news = self._drift = False
         # What new settings propose is shown at once.
         self._set_anew = False
+        # A revision that nobody has been told of, though the groups are those of the station before.
+        self._untold = False
         self._evaluated_ns = 0
-        self.view = GroupsView(options.revision, 0, (), (), (), options.grouping)
-        self.similarity = SimilarityView(0, (), 1.0, *(_frozen(np.zeros((0, 0))) for _ in range(3)))
+        self.view = GroupsView(0, 0, (), (), (), options.grouping)
+        self.similarity = SimilarityView(0, (), 1.0, *(_frozen(np.zeros((0, 0))) for _ in range(4)))
 
     def __contains__(self, robot: object) -> bool:
         return robot in self._affinity
@@ -95,6 +97,24 @@ class Groups:
             self._affinity.see_row(robot, known, np.full((len(known), 2), np.nan if overlap is None else overlap))
             self._drift = True
 
+    def restore(self, memory: Memory, ungrouped: Ungrouped, wall_ns: int) -> None:
+        """Take up groups of the station before, whose robots take part already, under a revision of their own.
+
+        The first evaluation weighs what is known by then against them as if they had stood all the time.
+        """
+        groups = memory.groups
+        self._members = dict(sorted(groups.items(), key=lambda group: min(group[1])))
+        self._label_of = {robot: label for label in groups for robot in groups[label]}
+        self._untold = memory.revision > 0 or bool(groups)
+        self.view = replace(
+            self.view,
+            revision=memory.revision + self._untold,
+            time_ns=wall_ns if self._untold else 0,
+            groups=_views(self._members),
+            ungrouped=ungrouped,
+            last_label=memory.label,
+        )
+
     def boundary(self, pair: Pair) -> float:
         """How near a pair is to the boundary of a group, from 0 to 1, as last evaluated.
 
@@ -138,16 +158,19 @@ class Groups:
                 effects.append(Happened(EventKind.WARNING, now_ns, f"groups: {self.view.note}"))
             self._news = self._drift = self._set_anew = False
             self._evaluated_ns = now_ns
-        elif ungrouped != self.view.ungrouped:
+        elif self._untold or ungrouped != self.view.ungrouped:
             members = self._members
         else:
             return []
-        if members == self._members and ungrouped == self.view.ungrouped:
-            return effects
-        groups = tuple(GroupView(label, tuple(sorted(robots))) for label, robots in members.items())
-        revision = self.view.revision + 1
-        self.view = replace(self.view, revision=revision, time_ns=wall_ns, groups=groups, ungrouped=ungrouped)
-        return effects + self._tell(members, now_ns)
+        if members != self._members or ungrouped != self.view.ungrouped:
+            revision, groups = self.view.revision + 1, _views(members)
+            self.view = replace(self.view, revision=revision, time_ns=wall_ns, groups=groups, ungrouped=ungrouped)
+            effects += self._tell(members, now_ns)
+        elif self._untold:
+            # Nothing has happened, but robots and the history are to know by which number the groups stand now.
+            effects.append(GroupsChanged(self.view.revision, tuple(sorted(self._label_of))))
+        self._untold = False
+        return effects
 
     def _pending_is_due(self, now_ns: int) -> bool:
         """Has the time of a change come since the last evaluation, or a clock been set back under it?"""
@@ -162,17 +185,22 @@ class Groups:
         affinity, options = self._affinity, self.view.settings
         sigma_m = affinity.sigma_m(options.sigma)
         S = affinity.similarity(options.alpha, sigma_m)
-        matrices = (_frozen(matrix) for matrix in (S, affinity.overlap, affinity.squared_m2))
+        matrices = (_frozen(matrix) for matrix in (S, affinity.overlap, affinity.squared_m2, affinity.mutual))
         self.similarity = SimilarityView(self.similarity.revision + 1, affinity.robots, sigma_m, *matrices)
         self._rows = {robot: row for row, robot in enumerate(self.similarity.robots)}
-        proposal = propose(affinity, S, sigma_m, options, None if self._set_anew else self._shown())
-        self.view = replace(self.view, scores=proposal.scores, note=proposal.note)
+        shown = None if self._set_anew else self._shown()
+        proposal = propose(S, lambda alpha: affinity.similarity(alpha, sigma_m), options, shown)
         standing = self._weigh(proposal, now_ns)
         self._pending = standing.pending
         waiting = {robot for change in standing.pending for group in change.before for robot in group}
-        self.view = replace(self.view, waiting=tuple(sorted(waiting)))
-        following = follow(self._members, standing.clusters, self._next_label)
-        self._next_label = following.next_label
+        following = follow(self._members, standing.clusters, self.view.last_label + 1)
+        self.view = replace(
+            self.view,
+            scores=proposal.scores,
+            note=proposal.note,
+            waiting=tuple(sorted(waiting)),
+            last_label=following.next_label - 1,
+        )
         return following.groups
 
     def _shown(self) -> Labels:
@@ -202,7 +230,7 @@ class Groups:
         moved = [
             robot
             for robot in sorted(former.keys() | self._label_of.keys())
-            if _own(before, former.get(robot)) != _own(members, self._label_of.get(robot))
+            if self._untold or _own(before, former.get(robot)) != _own(members, self._label_of.get(robot))
         ]
         revision = self.view.revision
         happened = [_happened(change, now_ns, revision) for change in changes(before, members)]
@@ -236,6 +264,10 @@ def _happened(change: Change, now_ns: int, revision: int) -> Happened:
         "moved": f"{robots} moved from {first} to {rest}",
     }[change.kind]
     return Happened(EventKind(change.kind), now_ns, text, change.robots, change.labels, revision - 1, revision)
+
+
+def _views(groups: Mapping[str, Members]) -> tuple[GroupView, ...]:
+    return tuple(GroupView(label, tuple(sorted(robots))) for label, robots in groups.items())
 
 
 def _frozen(matrix: Floats) -> Floats:

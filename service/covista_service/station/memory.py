@@ -23,7 +23,11 @@ class RememberedKeyframe:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RememberedRobot:
-    """A robot as it was last: where it stood by sensor time `pose_time_ns`, and its newest keyframe in use."""
+    """A robot as it was last: where it stood by sensor time `pose_time_ns`, and its newest keyframe in use.
+
+    `last_seen_ns` is its last sign of life, a message or its token. `judged_ns` is when it was judged first whom its
+    view may meet, None if it was not: of two that were, a pair that is neither remembered nor unknown shares nothing.
+    """
 
     id: str
     last_seen_ns: int
@@ -31,6 +35,7 @@ class RememberedRobot:
     pose: Pose | None = None
     pose_time_ns: int = 0
     keyframe: RememberedKeyframe | None = None
+    judged_ns: int | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +55,7 @@ class RememberedPair:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Memory:
-    """All that is remembered, times in ns of the wall.
+    """All that is remembered, times in ns of the wall. Of `unknown` pairs there were records, and no answer.
 
     Numbers of the station before that may have been used up: the highest `revision` of the groups, the highest number
     of a `label` (g7 is 7) and of an `event`. None of them is used again.
@@ -58,6 +63,7 @@ class Memory:
 
     robots: tuple[RememberedRobot, ...] = ()
     pairs: tuple[RememberedPair, ...] = ()
+    unknown: frozenset[Pair] = frozenset()
     groups: Mapping[str, frozenset[str]] = field(default_factory=dict)
     revision: int = 0
     label: int = 0

@@ -20,6 +20,7 @@ from covista_service.station.options import StationOptions, nanoseconds
 from covista_service.station.outlook import Outlook
 from covista_service.station.pairs import FAILED, NOT_SURVEYED, Answer, Judged, Pairs, apart, pair_of
 from covista_service.station.reach import Reach, depth_of, farthest_m
+from covista_service.station.recollection import Recollection
 from covista_service.station.roster import Robot, Roster
 
 # A smoothed overlap that has come down so far need not be told any more zeros.
@@ -73,6 +74,14 @@ class Neighbourhoods:
     def __getitem__(self, robot: str) -> Judged | None:
         """By which keyframe a robot was judged last, None if it was not yet."""
         return self._judged.get(robot)
+
+    def restore(self, known: Recollection) -> None:
+        """Take up who was judged when: who has no record with another shares nothing with it."""
+        judged = [(robot.judged_ns, robot) for robot in known.memory.robots if robot.judged_ns is not None]
+        for judged_ns, robot in sorted(judged, key=lambda one: one[0]):
+            keyframe = known.keyframe(robot)
+            if keyframe is not None:
+                self._judged[robot.id], self._ageing[robot.id] = Judged(keyframe, judged_ns), None
 
     def note(self, robot: str) -> None:
         """A robot has something new: judge it next time."""
@@ -223,7 +232,8 @@ class Neighbourhoods:
         partners = dict.fromkeys(self._meeting(name, self._reaches[name]))
         around = dict.fromkeys(self._around(name))
         for other in self._pairs.beside(name):
-            if other not in partners:
+            # Of who has sent no keyframe yet since the station started, nothing is known but what was.
+            if other not in partners and other in self._reaches:
                 pair = pair_of(name, other)
                 if self._worth_another_look(pair):
                     partners[other] = None
@@ -308,7 +318,7 @@ class Neighbourhoods:
         """
         record = self._pairs[pair]
         if record.outcome in (NOT_SURVEYED, FAILED) and not record.verified:
-            return record.measured and sum(self._pairs.overlaps(pair) or ()) > 0
+            return (record.measured or record.remembered) and sum(self._pairs.overlaps(pair) or ()) > 0
         return record.verified
 
 

@@ -41,7 +41,7 @@ class StationOptions:
     `retry_after_s`: see `Patrol`. A new keyframe's first survey regroups within 20 ms; other surveys and poses do at
     most every `regroup_after_s`; both come later in swarms of more than 100 and 500 robots, by .2 ms a robot.
     Of robots that have moved, no more than `forecasts_per_s` ordered pairs are read anew from known surfaces; with 0
-    none are. `revision` is the last one of the groups that was told before this station started.
+    none are.
     """
 
     capacity: int = 2
@@ -53,7 +53,6 @@ class StationOptions:
     retry_after_s: float = 30.0
     regroup_after_s: float = 0.1
     forecasts_per_s: float = 4000.0
-    revision: int = 0
     grouping: GroupingOptions = GroupingOptions()
 
 

@@ -43,6 +43,11 @@ class Answer:
     matched: bool = False
 
     @property
+    def remembered(self) -> bool:
+        """Is it of a time before this station started, by a keyframe of which no features are left?"""
+        return self.first.features is None or self.second.features is None
+
+    @property
     def keyframes(self) -> tuple[KeyframeId, KeyframeId]:
         """Which keyframes it is of."""
         return self.first.id, self.second.id
@@ -81,6 +86,11 @@ class PairRecord:
     def measured(self) -> bool:
         """Does the answer rest on images?"""
         return self.answer is not None and self.answer.matched
+
+    @property
+    def remembered(self) -> bool:
+        """Is the answer one of the station before? Perhaps it rests on images."""
+        return self.answer is not None and self.answer.remembered
 
     @property
     def explained(self) -> bool:
@@ -225,7 +235,8 @@ def apart(first: Judged, second: Judged) -> Answer:
     It is as old as the younger of the two judgements.
     """
     computed_ns = max(first.first_ns, second.first_ns)
-    return Answer((0.0, 0.0), FoundBy.PREDICTED, computed_ns, first.keyframe, second.keyframe)
+    answer = Answer((0.0, 0.0), FoundBy.PREDICTED, computed_ns, first.keyframe, second.keyframe)
+    return replace(answer, found_by=FoundBy.DECAYED) if answer.remembered else answer
 
 
 def _same(held: Answer, answer: Answer) -> bool:

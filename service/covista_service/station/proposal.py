@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from covista_service.grouping import selection
-from covista_service.grouping.affinity import Affinity
 from covista_service.grouping.bounds import Bounds
 from covista_service.grouping.components import LINK, components
 from covista_service.grouping.hysteresis import held
@@ -18,7 +18,7 @@ from covista_service.station.options import GroupingOptions
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Proposal:
-    """Labels (N,) in the order of the affinity's robots, the score of every number of groups, and a note if any.
+    """Labels (N,) in the order of the robots, the score of every number of groups, and a note if any.
 
     `contributions` tell what each robot adds to the score of any grouping; `bounds` are those in force.
     """
@@ -30,8 +30,10 @@ class Proposal:
     bounds: Bounds
 
 
-def propose(affinity: Affinity, S: Floats, sigma_m: float, options: GroupingOptions, shown: Labels | None) -> Proposal:
-    """Group the robots of an affinity by their similarity S (N, N), `sigma_m` being the range it was made with.
+def propose(
+    S: Floats, similarity: Callable[[float], Floats], options: GroupingOptions, shown: Labels | None = None
+) -> Proposal:
+    """Group robots by their similarity S (N, N); `similarity` tells what it is with another alpha.
 
     Bounds that so many robots cannot keep are loosened, and the note says so. `shown` (N,) are the groups on show, to
     hold on to.
@@ -40,7 +42,7 @@ def propose(affinity: Affinity, S: Floats, sigma_m: float, options: GroupingOpti
     alpha = options.alpha
     if options.grouping == "distance":
         alpha = 0.0
-        S = affinity.similarity(alpha, sigma_m)
+        S = similarity(alpha)
     if shown is not None:
         S = held(S, shown, options.hysteresis.gain)
     asked = Bounds(options.groups, options.min_group_size)

@@ -11,8 +11,10 @@ from covista_schemas.reports import Status
 from covista_service.perception.camera import Pose
 from covista_service.station.events import Keyframe, KeyframeId, Topic
 from covista_service.station.ledger import Counts, Ledger, Total
+from covista_service.station.memory import RememberedRobot
 from covista_service.station.options import StationOptions, nanoseconds
 from covista_service.station.reach import Depth
+from covista_service.station.recollection import Recollection
 
 _PAST_BOOTS = 16
 # A robot's clock that falls back by more than this was set; by less, the message is late.
@@ -35,7 +37,8 @@ class Robot:
     """One robot, as far as the station has heard of it.
 
     `announced` names the newest keyframe that came, usable or not; `arrived` is the newest usable one, `keyframe` the
-    newest with features, which is in use. `last_seen_ns` is wall time.
+    newest with features, which is in use; `remembered` was in use before this station started, and has no features any
+    more. `last_seen_ns` is wall time. Until `awaited_until_ns` a silent robot is not said to be gone.
     """
 
     id: str
@@ -53,9 +56,28 @@ class Robot:
     announced: KeyframeId | None = None
     arrived: Keyframe | None = None
     keyframe: Keyframe | None = None
+    remembered: Keyframe | None = None
+    awaited_until_ns: int = 0
     depth: Depth | None = None
     last_problem: str | None = None
     ledgers: dict[Topic, Ledger] = field(default_factory=lambda: {"keyframe": Ledger(), "pose": Ledger()})
+
+    @classmethod
+    def of(cls, known: RememberedRobot, keyframe: Keyframe | None) -> Robot:
+        """A robot as it was last, by the station before."""
+        seen_ns = known.last_seen_ns
+        return cls(
+            known.id,
+            sign_of_life_ns=seen_ns,
+            heard_ns=seen_ns,
+            last_seen_ns=seen_ns,
+            boot=known.boot,
+            boot_heard_ns=seen_ns,
+            fix=None if known.pose is None else Fix(known.pose, known.pose_time_ns, known.boot or ""),
+            announced=None if keyframe is None else keyframe.id,
+            arrived=keyframe,
+            remembered=keyframe,
+        )
 
     def enters(self, boot: str, arrived_ns: int) -> bool:
         """Take the boot of a message for the current one; True if it is current now.
@@ -143,6 +165,19 @@ class Roster:
             self._robots[robot] = Robot(robot)
         return self._robots[robot]
 
+    def restore(self, known: Recollection, now_ns: int) -> None:
+        """Take up robots as they were last, their accounts anew.
+
+        Nobody listened while there was no station: who stood in a group and has been silent for too long meanwhile is
+        awaited for as long as it takes a robot to be stale.
+        """
+        standing = frozenset().union(*known.memory.groups.values())
+        for remembered in known.memory.robots:
+            robot = self._robots[remembered.id] = Robot.of(remembered, known.keyframe(remembered))
+            if robot.id in standing:
+                robot.awaited_until_ns = now_ns + self._stale_after_ns
+            robot.status = self.status(robot, now_ns)
+
     def forget(self, robot: str) -> None:
         """Drop all that is known of a robot, but for what it adds to the accounts of all."""
         for topic, ledger in self._robots.pop(robot).ledgers.items():
@@ -169,7 +204,7 @@ class Roster:
         silent_ns = now_ns - robot.sign_of_life_ns
         if robot.tokens or silent_ns < self._stale_after_ns:
             return Status.LIVE
-        return Status.STALE if silent_ns < self._gone_after_ns else Status.GONE
+        return Status.STALE if silent_ns < self._gone_after_ns or now_ns < robot.awaited_until_ns else Status.GONE
 
     def lapsed(self, robot: Robot, now_ns: int) -> bool:
         """Has it been silent for so long that it is to be forgotten?"""

@@ -31,8 +31,9 @@ Reason = Literal["no_pose", "gone"]
 class RobotView:
     """One robot; `camera` is that of its newest keyframe.
 
-    `keyframe` is the newest in use, `announced` the newest that came, usable or not. `judged` is by which it was judged
-    whom its view may meet.
+    `in_use` is the newest keyframe in use, `announced` the newest that came, usable or not. `judged` is by which it was
+    judged whom its view may meet. Who is `present` has a token, and lives; `sign_of_life_ns` is the last one of others,
+    in the station's time.
     """
 
     id: str
@@ -41,7 +42,7 @@ class RobotView:
     boot: str | None
     camera: Camera | None
     fix: Fix | None
-    keyframe: KeyframeId | None
+    in_use: Keyframe | None
     announced: KeyframeId | None
     last_seen_ns: int | None
     clock_offset_s: float | None
@@ -50,6 +51,13 @@ class RobotView:
     poses: Counts
     last_problem: str | None
     judged: Judged | None = None
+    present: bool = False
+    sign_of_life_ns: int = 0
+
+    @property
+    def keyframe(self) -> KeyframeId | None:
+        """Name of the newest keyframe in use."""
+        return None if self.in_use is None else self.in_use.id
 
     @classmethod
     def of(cls, robot: Robot, group: str | None, correction: Correction | None, judged: Judged | None) -> RobotView:
@@ -62,7 +70,7 @@ class RobotView:
             boot=robot.boot,
             camera=None if robot.arrived is None else robot.arrived.camera,
             fix=robot.fix,
-            keyframe=None if robot.keyframe is None else robot.keyframe.id,
+            in_use=robot.keyframe or robot.remembered,
             announced=robot.announced,
             last_seen_ns=robot.last_seen_ns,
             clock_offset_s=None if offset_ns is None else offset_ns / NS_PER_S,
@@ -71,6 +79,8 @@ class RobotView:
             poses=robot.ledgers["pose"].counts(),
             last_problem=robot.last_problem,
             judged=judged,
+            present=bool(robot.tokens),
+            sign_of_life_ns=robot.sign_of_life_ns,
         )
 
 
@@ -109,7 +119,8 @@ class PairView:
 class SimilarityView:
     """The matrices (N, N) of the last evaluation in the order of `robots`; unknown overlaps are NaN.
 
-    `sigma_m` is the range of Eq. 15. Distances and closeness are computed when somebody asks.
+    `sigma_m` is the range of Eq. 15. Overlaps are as last told; `mutual`, what two share, is smoothed. Distances and
+    closeness are computed when somebody asks.
     """
 
     revision: int
@@ -118,6 +129,7 @@ class SimilarityView:
     similarity: Floats
     overlap: Floats
     squared_m2: Floats
+    mutual: Floats
 
     @property
     def distance_m(self) -> Floats:
@@ -143,7 +155,8 @@ class GroupsView:
     """The grouping in force since `time_ns`.
 
     As last evaluated: the scores of the numbers of groups, a note on settings that cannot be kept, and the robots of
-    groups that others are proposed for and not shown yet (`waiting`).
+    groups that others are proposed for and not shown yet (`waiting`). `last_label` is the highest number of a label
+    that was ever used.
     """
 
     revision: int
@@ -154,6 +167,7 @@ class GroupsView:
     settings: GroupingOptions
     note: str | None = None
     waiting: tuple[str, ...] = ()
+    last_label: int = 0
     by_label: Mapping[str, GroupView] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

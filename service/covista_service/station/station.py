@@ -13,7 +13,6 @@ from covista_service.station.census import Census
 from covista_service.station.events import (
     Effect,
     Event,
-    ExtractFeatures,
     FeaturesExtracted,
     ForgetRobot,
     GroupsChanged,
@@ -32,22 +31,21 @@ from covista_service.station.events import (
     TokenLost,
     TokenSeen,
 )
-from covista_service.station.extraction import Extractions
 from covista_service.station.forecasts import Read
 from covista_service.station.groups import Groups, Ungrouped
-from covista_service.station.options import NS_PER_S, GroupingOptions, StationOptions, nanoseconds
+from covista_service.station.keyframes import Keyframes
+from covista_service.station.memory import Memory
+from covista_service.station.options import GroupingOptions, StationOptions, nanoseconds
 from covista_service.station.pairs import Pairs
+from covista_service.station.presence import Presence
+from covista_service.station.recollection import Recollection, sensible
 from covista_service.station.roster import Robot, Roster
 from covista_service.station.snapshot import RobotView, Snapshot
-from covista_service.station.successors import Successors
 from covista_service.station.surveys import Surveys
 from covista_service.station.timeline import Timeline
 
 # A clock further off than this is worth a look.
 _CLOCK_OFF_NS = nanoseconds(10)
-
-# Everybody's presence is looked at so often; who is heard of, at once.
-_LOOK_NS = NS_PER_S // 10
 
 
 class Station:
@@ -62,18 +60,15 @@ class Station:
         self._unknown_after_ns = nanoseconds(self.options.unknown_after_s)
         self._timeline = Timeline()
         self._roster = Roster(self.options)
+        self._presence = Presence(self._roster)
         self._pairs = Pairs(self._unknown_after_ns)
         self._groups = Groups(self.options)
         self._surveys = Surveys(self._roster, self._pairs, self._groups, self.options, read)
-        self._extractions = Extractions(self.options.capacity)
-        self._successors = Successors()
+        self._keyframes = Keyframes(self._roster, self._surveys, self.options.capacity)
         self._views: dict[str, RobotView] = {}
         # Robots by id, and those that stand in no group, until somebody comes or goes.
         self._sorted: list[str] | None = None
         self._outside: Ungrouped | None = None
-        # Who was heard of since presence was looked at, and when everybody's was.
-        self._heard: dict[str, None] = {}
-        self._looked_ns: int | None = None
         self._snapshot: Snapshot | None = None
 
     def receive(self, event: Event, now_ns: int) -> list[Effect]:
@@ -88,6 +83,23 @@ class Station:
         """Is there news, of a survey or of poses, that should not wait for the next event?"""
         return self._surveys.news or self._surveys.forecasts.waiting > 0
 
+    def restore(self, memory: Memory, now_ns: int) -> None:
+        """Go on where the station before has ended, as far as its memory makes sense; ValueError once there are robots.
+
+        Nothing of it has happened now: only what is found to be otherwise is told of, from the next Tick on.
+        """
+        if any(self._roster):
+            raise ValueError("a station that knows robots already cannot take up those of another")
+        now_ns = self._timeline.at(now_ns)
+        known = Recollection(sensible(memory, now_ns))
+        self._roster.restore(known, now_ns)
+        self._surveys.restore(known)
+        self._sorted = self._outside = self._snapshot = None
+        for robot in self._roster:
+            if robot.status is not Status.GONE:
+                self._place(robot)
+        self._groups.restore(known.memory, self._ungrouped(), self._timeline.wall_ns(now_ns))
+
     def resize(self, capacity: int) -> None:
         """So many extractions, and so many surveys and surfaces, may be under way at once from now on.
 
@@ -97,7 +109,7 @@ class Station:
             raise ValueError(f"a station needs at least one hand, not {capacity}")
         self.options = replace(self.options, capacity=capacity)
         self._surveys.resize(capacity)
-        self._extractions.capacity = capacity
+        self._keyframes.resize(capacity)
 
     def set_grouping(self, options: GroupingOptions) -> None:
         """Group by other settings from the next Tick on."""
@@ -166,12 +178,15 @@ class Station:
     def _obey(self, event: SettingsGiven | ForgetRobot, now_ns: int) -> list[Effect]:
         """What a person wants."""
         if isinstance(event, SettingsGiven):
+            if event.options == self.options.grouping:
+                return []
             self.set_grouping(event.options)
             return [Happened(EventKind.SETTINGS, now_ns, event.text, by=event.by)]
-        if event.robot not in self._roster:
-            return []
-        self._forget(event.robot)
-        return [Happened(EventKind.STATUS, now_ns, f"{event.robot} is forgotten", (event.robot,), by=event.by)]
+        return [self._forgotten(event.robot, now_ns, event.by)] if event.robot in self._roster else []
+
+    def _forgotten(self, robot: str, now_ns: int, by: str | None = None) -> Happened:
+        self._forget(robot)
+        return Happened(EventKind.STATUS, now_ns, f"{robot} is forgotten", (robot,), by=by)
 
     def _token(self, event: TokenSeen | TokenLost, now_ns: int) -> None:
         if isinstance(event, TokenSeen):
@@ -203,34 +218,16 @@ class Station:
     def _keyframe_arrived(self, keyframe: Keyframe) -> list[Effect]:
         robot = self._touch(keyframe.id.robot)
         self._hear(robot, keyframe.arrived_ns, keyframe.time_ns)
-        ledger, message = robot.ledgers["keyframe"], (keyframe.id.boot, keyframe.id.sequence)
-        if not ledger.take(message):
+        if not self._keyframes.enters(robot, keyframe):
             return []
-        if not robot.enters(keyframe.id.boot, keyframe.arrived_ns) or _older(keyframe, robot.arrived):
-            ledger.settle(message, "replaced")
-            return []
-        robot.arrived = keyframe
         self._locate(robot, keyframe.pose, keyframe.time_ns, keyframe.id.boot)
-        if keyframe.features is None:
-            self._replace(self._extractions.wait(keyframe))
-        else:
-            self._replace(self._extractions.withdraw(robot.id))
-            self._succeed(robot, keyframe)
-        return self._extract()
+        return self._keyframes.take(robot, keyframe)
 
     def _features_extracted(self, event: FeaturesExtracted) -> list[Effect]:
-        keyframe, robot = self._extractions.done(event.keyframe), self._roster.get(event.keyframe.robot)
-        if keyframe is not None and robot is not None:
+        robot = self._keyframes.extracted(event)
+        if robot is not None:
             self._touch(robot.id)
-            if event.features is None:
-                message = (keyframe.id.boot, keyframe.id.sequence)
-                robot.ledgers["keyframe"].reject(message, event.code)
-                robot.last_problem = event.problem
-            elif keyframe.id.boot != robot.boot or _older(keyframe, self._successors[robot.id] or robot.keyframe):
-                self._replace(keyframe)
-            else:
-                self._succeed(robot, replace(keyframe, features=event.features, thumbnail=event.thumbnail))
-        return self._extract()
+        return self._keyframes.start()
 
     def _pose_arrived(self, event: PoseArrived) -> None:
         robot = self._touch(event.robot)
@@ -249,26 +246,6 @@ class Station:
             for name in event.job.keyframes:
                 self._views.pop(name.robot, None)
         return [*self._surveys.take(event, now_ns)]
-
-    def _succeed(self, robot: Robot, keyframe: Keyframe) -> None:
-        """Use a robot's new keyframe, once the one before has come to something."""
-        if self._surveys.busy(robot.id):
-            self._replace(self._successors.wait(keyframe))
-        else:
-            self._replace(self._successors.withdraw(robot.id))
-            self._use(robot, keyframe)
-
-    def _use(self, robot: Robot, keyframe: Keyframe) -> None:
-        robot.ledgers["keyframe"].settle((keyframe.id.boot, keyframe.id.sequence), "used")
-        self._surveys.keyframe(robot, keyframe)
-
-    def _replace(self, keyframe: Keyframe | None) -> None:
-        if keyframe is not None:
-            ledger = self._roster[keyframe.id.robot].ledgers["keyframe"]
-            ledger.settle((keyframe.id.boot, keyframe.id.sequence), "replaced")
-
-    def _extract(self) -> list[Effect]:
-        return [ExtractFeatures(keyframe) for keyframe in self._extractions.start()]
 
     def _locate(self, robot: Robot, pose: Pose, time_ns: int, boot: str) -> bool:
         newest = robot.locate(pose, time_ns, boot)
@@ -292,8 +269,8 @@ class Station:
         """Every part of it, whatever becomes of the others: what is under way must get to the workers."""
         effects: list[Effect] = []
         failures: list[Exception] = []
-        start, extract = self._surveys.start, lambda _: self._extract()
-        for part in (self._presence, self._expire, self._judge, extract, start, self._look, self._regroup):
+        start, extract = self._surveys.start, lambda _: self._keyframes.start()
+        for part in (self._look_around, self._expire, self._judge, extract, start, self._look, self._regroup):
             try:
                 effects += part(now_ns)
             except Exception as error:  # noqa: BLE001 - raised below
@@ -313,8 +290,8 @@ class Station:
         return []
 
     def _judge(self, now_ns: int) -> list[Effect]:
-        for keyframe in self._successors.due(self._surveys.busy, now_ns):
-            self._use(self._touch(keyframe.id.robot), keyframe)
+        for robot in self._keyframes.due(now_ns):
+            self._touch(robot)
         judged = self._surveys.judge(now_ns)
         for robot in judged:
             self._views.pop(robot, None)
@@ -327,26 +304,13 @@ class Station:
             self._snapshot = None
         return []
 
-    def _presence(self, now_ns: int) -> list[Effect]:
-        """Look at those who were heard of, and at everybody some times a second."""
-        heard, self._heard = self._heard, {}
-        everybody = self._looked_ns is None or not 0 <= now_ns - self._looked_ns < _LOOK_NS
-        if everybody:
-            self._looked_ns = now_ns
-        happened: list[Effect] = []
-        for name in list(self._names()) if everybody else sorted(heard):
-            robot = self._roster.get(name)
-            if robot is not None:
-                happened += self._look_at(robot, now_ns)
-        return happened
+    def _look_around(self, now_ns: int) -> list[Effect]:
+        return [self._become(robot, status, now_ns) for robot, status in self._presence.changes(self._names(), now_ns)]
 
-    def _look_at(self, robot: Robot, now_ns: int) -> list[Happened]:
-        if self._roster.lapsed(robot, now_ns):
-            self._forget(robot.id)
-            return [Happened(EventKind.STATUS, now_ns, f"{robot.id} is forgotten", (robot.id,))]
-        status = self._roster.status(robot, now_ns)
-        if status is robot.status:
-            return []
+    def _become(self, robot: Robot, status: Status | None, now_ns: int) -> Happened:
+        """A robot's presence is another from now on; None: it is forgotten."""
+        if status is None:
+            return self._forgotten(robot.id, now_ns)
         robot.status = status
         self._outside = None
         self._views.pop(robot.id, None)
@@ -354,7 +318,7 @@ class Station:
             self._groups.withdraw(robot.id)
         elif robot.id not in self._groups:
             self._place(robot)
-        return [Happened(EventKind.STATUS, now_ns, f"{robot.id} is {status}", (robot.id,))]
+        return Happened(EventKind.STATUS, now_ns, f"{robot.id} is {status}", (robot.id,))
 
     def _regroup(self, now_ns: int) -> list[Effect]:
         before = self._groups.view, self._groups.similarity
@@ -391,8 +355,7 @@ class Station:
     def _forget(self, robot: str) -> None:
         self._groups.withdraw(robot)
         self._surveys.forget(robot)
-        self._extractions.forget(robot)
-        self._successors.withdraw(robot)
+        self._keyframes.forget(robot)
         self._roster.forget(robot)
         self._views.pop(robot, None)
         self._snapshot = self._sorted = self._outside = None
@@ -401,14 +364,9 @@ class Station:
         if robot not in self._roster:
             self._sorted = self._outside = None
         self._views.pop(robot, None)
-        self._heard[robot] = None
+        self._presence.heard(robot)
         return self._roster.meet(robot)
 
     def _view(self, robot: Robot) -> RobotView:
         correction, judged = self._surveys.correction(robot.id), self._surveys.neighbourhoods[robot.id]
         return RobotView.of(robot, self._groups.label_of(robot.id), correction, judged)
-
-
-def _older(keyframe: Keyframe, held: Keyframe | None) -> bool:
-    """Was it sent before another of the same boot?"""
-    return held is not None and held.id.boot == keyframe.id.boot and keyframe.id.sequence < held.id.sequence

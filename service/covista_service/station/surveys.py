@@ -26,6 +26,7 @@ from covista_service.station.options import StationOptions
 from covista_service.station.outlook import view_of
 from covista_service.station.outlooks import Outlooks
 from covista_service.station.pairs import Pairs
+from covista_service.station.recollection import Recollection
 from covista_service.station.roster import Robot, Roster
 from covista_service.station.workload import Workload
 
@@ -51,6 +52,14 @@ class Surveys:
         self._unseen: dict[str, dict[KeyframeId, int]] = {}
         self._compared: set[KeyframeId] = set()
         self._seen: list[tuple[KeyframeId, int]] = []
+
+    def restore(self, known: Recollection) -> None:
+        """Take up what pairs had in common; of the keyframes of that time there is nothing to survey any more."""
+        for pair in known.memory.pairs:
+            self._pairs.meet(pair.pair, known.answer(pair))
+        for unknown in sorted(known.memory.unknown):
+            self._pairs.meet(unknown, None)
+        self.neighbourhoods.restore(known)
 
     def keyframe(self, robot: Robot, keyframe: Keyframe) -> None:
         """Use a robot's new keyframe. Until it has a surface of its own it is answered for by the last one's."""

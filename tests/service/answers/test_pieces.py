@@ -17,7 +17,7 @@ def swarm(robots: int, seed: int) -> Snapshot:
     rng = np.random.default_rng(seed)
     S, distance_m = rng.random((robots, robots)), rng.random((robots, robots)) * 100
     overlap = np.where(rng.random((robots, robots)) < 0.5, np.nan, rng.random((robots, robots)))
-    view = SimilarityView(seed, tuple(f"r{i}" for i in range(robots)), 3.0, S, overlap, distance_m**2)
+    view = SimilarityView(seed, tuple(f"r{i}" for i in range(robots)), 3.0, S, overlap, distance_m**2, overlap)
     return replace(Station().snapshot(0), similarity=view)
 
 

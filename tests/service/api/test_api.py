@@ -131,3 +131,12 @@ def test_head_is_answered_as_get_is(desk: Desk, path: str) -> None:
     asked, known = desk.ask(f"/api/v1{path}", "HEAD"), desk.get(path)
     assert asked.status_code == known.status_code
     assert asked.headers["content-type"] == known.headers["content-type"]
+
+
+def test_of_a_keyframe_of_before_the_station_started_there_is_no_picture(desk: Desk) -> None:
+    again = Desk(scene=desk.scene.restarted(1))
+    told = again.get("/pairs/r1/r2")
+    assert told.json()["found_by"] == "decayed"
+    assert told.json()["keyframes"] == desk.get("/pairs/r1/r2").json()["keyframes"]
+    assert again.get("/pairs/r1/r2/overlay.png").status_code == 404
+    assert again.get("/pairs/r1/r2/overlay.png").json()["title"] == "No picture"

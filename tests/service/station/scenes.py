@@ -31,9 +31,11 @@ from covista_service.station.events import (
     SurveyPair,
     Tick,
 )
+from covista_service.station.memory import Memory
 from covista_service.station.options import StationOptions
 from covista_service.station.outlook import Prospect, Ratios
 from covista_service.station.pairs import Answer
+from covista_service.station.remembering import remember
 from covista_service.station.snapshot import Snapshot
 from covista_service.station.station import Station
 
@@ -83,6 +85,7 @@ class Scene:
 
     options: StationOptions = field(default_factory=lambda: StationOptions(regroup_after_s=0.0))
     now_ns: int = START_NS
+    memory: Memory | None = None
     depth_m: float = 4.0
     shares: dict[Pair, tuple[float, float]] = field(default_factory=dict)
     told: list[Effect] = field(default_factory=list)
@@ -94,6 +97,13 @@ class Scene:
 
     def __post_init__(self) -> None:
         self.station = Station(self.options, self._read)
+        if self.memory is not None:
+            self.station.restore(self.memory, self.now_ns)
+
+    def restarted(self, seconds: float = 0.0) -> "Scene":
+        """The same rovers, with a station that starts so much later and knows what this one would remember."""
+        later_ns = self.now_ns + round(seconds * S)
+        return replace(self, now_ns=later_ns, memory=remember(self.snapshot), told=[])
 
     def receive(self, *events: Event) -> list[Effect]:
         effects = [effect for event in events for effect in self.station.receive(event, self.now_ns)]

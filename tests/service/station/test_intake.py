@@ -264,4 +264,4 @@ def test_the_hands_of_a_robot_that_is_forgotten_are_full_until_they_are_back() -
         if turn % 3 == 2:
             keyframe = under_way.pop(0)
             scene.receive(FeaturesExtracted(keyframe, FEATURES if turn % 2 else None, code="bad_image"))
-    assert scene.station._extractions._abandoned.total() == 1
+    assert scene.station._keyframes._extractions._abandoned.total() == 1
