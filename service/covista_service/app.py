@@ -32,6 +32,7 @@ from covista_service.station.station import Station
 from covista_service.store.archive import Archive
 from covista_service.store.database import check_url
 from covista_service.store.history import History
+from covista_service.store.retention import Retention
 from covista_service.telemetry import Telemetry, about
 from covista_service.workers import Workers, WorkersOptions, check_kind, daemon
 
@@ -72,18 +73,20 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
         close_later(Ingest(session, settings.site, mailboxes).close)
         publisher = Publisher(session, settings.site)
         close_later(publisher.close)
-        history = await asyncio.to_thread(History, settings.database)
-        close_later(history.close)
         archive = Archive(settings.database)
         close_later(archive.close)
-        settings = with_stored(settings, {})
+        retention = Retention(settings.retention_days, settings.retention_mb)
+        history = await asyncio.to_thread(lambda: History(settings.database, retention=retention))
+        close_later(history.close)
+        settings = with_stored(settings, history.stored_settings())
         stream = Stream(history.last.event + 1)
         telemetry = Telemetry()
         options = WorkersOptions(settings.workers, settings.workers_count)
         workers = await asyncio.to_thread(Workers, options, telemetry.took)
         close_later(workers.close)
         station = Station(_station_options(settings, workers.capacity))
-        station.restore(Memory(revision=history.last.revision), time.time_ns())
+        memory = await asyncio.to_thread(history.recall, settings.forget_after_s, settings.unknown_after_s)
+        station.restore(memory, time.time_ns())
         loop = Loop(
             station,
             Inbox(mailboxes),
@@ -94,6 +97,7 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
         )
         task = asyncio.create_task(_run(loop), name="covista-loop")
         stack.push_async_callback(_end, task)
+        history.follow(loop.ask)
         close_later(Queries(session, settings.site, loop.ask).close)
         link = PartHealth(status="ready", detail=", ".join((*settings.link, *settings.connect)))
 
@@ -119,7 +123,7 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
             vitals_now,
             secrets.token_hex(4),
             archive=archive,
-            flush=lambda _: True,
+            flush=history.flush,
             stream=stream,
         )
         log.info("stops", extra=about(surveys=telemetry.summary().surveys))

@@ -112,6 +112,16 @@ class Settings(LiveSettings, BaseSettings):
     database: Annotated[str, AfterValidator(_check_database)] = Field(
         default="sqlite:///covista.db", description="URL of the database for the history."
     )
+    retention_days: float = Field(
+        default=30, gt=0, le=36_500, allow_inf_nan=False, description="The history is kept for so many days."
+    )
+    retention_mb: float = Field(
+        default=1024,
+        ge=8,
+        le=1e9,
+        allow_inf_nan=False,
+        description="The database takes at most so many MB (1e6 bytes): when it would take more, the oldest goes.",
+    )
     workers: Annotated[str, AfterValidator(_check_workers)] = Field(
         default="threads", description="Where surveys run: threads, processes, or a cluster as dask://HOST:PORT."
     )

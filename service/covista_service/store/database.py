@@ -7,7 +7,16 @@ from typing import Any
 
 from covista_schemas.errors import CovistaError
 from sqlalchemy import URL, Connection, Engine, create_engine, event
-from sqlalchemy.exc import ArgumentError, DBAPIError, DisconnectionError, NoSuchModuleError, SQLAlchemyError
+from sqlalchemy.exc import (
+    ArgumentError,
+    DataError,
+    DBAPIError,
+    DisconnectionError,
+    IntegrityError,
+    NoSuchModuleError,
+    SQLAlchemyError,
+    StatementError,
+)
 
 # How long a statement waits for another process that has the file, or the table, locked.
 WAIT_S = 1.0
@@ -19,6 +28,8 @@ _SETTING = "setting database (--database, COVISTA_DATABASE)"
 # A file of SQLite is cut back to this when it has been written into the database, which is done every so many pages.
 _LOG_BYTES = 1 << 20
 _LOG_PAGES = 256
+# What can be written anew in a second.
+_SMALL_BYTES = 50_000_000
 
 
 class DatabaseError(CovistaError):
@@ -57,6 +68,23 @@ def file_is_gone(engine: Engine) -> bool:
     """Whether the engine's database is a file of SQLite that is not there, or not any more."""
     file = file_of(engine.url)
     return file is not None and not file.exists()
+
+
+def prepare_file(engine: Engine) -> None:
+    """Let a file of SQLite that an earlier version has made give back room too; a large one is left as it is."""
+    file = file_of(engine.url)
+    if file is None or not file.exists() or file.stat().st_size > _SMALL_BYTES:
+        return
+    connection = engine.raw_connection()
+    try:
+        # Outside transactions, which SQLAlchemy would begin.
+        cursor = connection.cursor()
+        if cursor.execute("PRAGMA auto_vacuum").fetchone()[0] == 0:
+            cursor.execute("PRAGMA auto_vacuum = INCREMENTAL")
+            cursor.execute("VACUUM")
+        cursor.close()
+    finally:
+        connection.close()
 
 
 def first_line(error: Exception) -> str:
@@ -113,13 +141,15 @@ def _prepare_postgresql(engine: Engine, *, reads: bool) -> None:
     class Impatient(psycopg.Connection[Any]):
         """Gives up on a server that does not answer: the driver alone would wait for ever."""
 
-        def wait(self, gen: Any, interval: float = 0.1, timeout: float | None = SILENCE_S) -> Any:
-            """What comes of a generator of the driver's; TimeoutError of its own kind if that takes too long."""
+        patience_s = SILENCE_S
+
+        def wait(self, gen: Any, interval: float = 0.1, timeout: float | None = None) -> Any:
+            """What comes of a generator of the driver's; OperationalError if that takes too long."""
             try:
-                return super().wait(gen, interval, timeout)
+                return super().wait(gen, interval, timeout or self.patience_s)
             except psycopg.errors._WaitTimeout as error:
                 self.pgconn.finish()
-                raise psycopg.OperationalError(f"no answer for {SILENCE_S:g} s") from error
+                raise psycopg.OperationalError(f"no answer for {self.patience_s:g} s") from error
 
     milliseconds = round(1000 * WAIT_S)
     options = [f"statement_timeout={round(1000 * SILENCE_S) - 500}", f"lock_timeout={milliseconds}"]
@@ -141,4 +171,13 @@ def _prepare_postgresql(engine: Engine, *, reads: bool) -> None:
         return Impatient.connect(*arguments, **(usual | parameters))
 
 
-UNUSABLE = (SQLAlchemyError, OSError)
+# What may come of a database that cannot be used as it is.
+UNUSABLE = (SQLAlchemyError, OSError, DatabaseError)
+
+
+def is_passing(error: Exception) -> bool:
+    """Is it the database that cannot be used, and not what was to be stored?"""
+    if isinstance(error, StatementError):
+        # What comes of the database itself, but for values that it does not take.
+        return isinstance(error, DBAPIError) and not isinstance(error, DataError | IntegrityError)
+    return isinstance(error, UNUSABLE)

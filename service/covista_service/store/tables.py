@@ -103,6 +103,7 @@ robots_now = Table(
     *_pose(nullable=True),
     Column("keyframe_boot", Text),
     Column("keyframe_sequence", BigInteger),
+    Column("judged_ns", BigInteger),
 )
 
 keyframes_now = Table(
@@ -117,19 +118,18 @@ keyframes_now = Table(
     *_pose(nullable=False),
 )
 
+# All but the two ids is null while nothing is known of a pair.
 pairs_now = Table(
     "pairs_now",
     metadata,
     Column("a", ID, primary_key=True),
     Column("b", ID, primary_key=True),
-    Column("computed_ns", BigInteger, nullable=False),
-    Column("overlap_a", Double, nullable=False),
-    Column("overlap_b", Double, nullable=False),
-    *[Column(name, Double) for name in ("low_a", "high_a", "low_b", "high_b")],
-    Column("boot_a", Text, nullable=False),
-    Column("sequence_a", BigInteger, nullable=False),
-    Column("boot_b", Text, nullable=False),
-    Column("sequence_b", BigInteger, nullable=False),
+    Column("computed_ns", BigInteger),
+    *[Column(name, Double) for name in ("overlap_a", "overlap_b", "low_a", "high_a", "low_b", "high_b")],
+    Column("boot_a", Text),
+    Column("sequence_a", BigInteger),
+    Column("boot_b", Text),
+    Column("sequence_b", BigInteger),
     Column("pose_time_a_ns", BigInteger),
     Column("pose_time_b_ns", BigInteger),
 )

@@ -231,7 +231,7 @@ def test_readers_do_not_wait_for_who_writes(engine: Engine, archive: Archive) ->
 
 
 def test_no_reader_changes_anything(archive: Archive, url: str) -> None:
-    with pytest.raises(Exception, match="readonly|read-only"), archive._engine.begin() as connection:
+    with pytest.raises(Exception, match=r"readonly|read-only"), archive._engine.begin() as connection:
         connection.execute(text("delete from events"))
 
 

@@ -82,6 +82,7 @@ def _present() -> None:
         *[sa.Column(name, sa.Double) for name in _POSE],
         sa.Column("keyframe_boot", sa.Text),
         sa.Column("keyframe_sequence", sa.BigInteger),
+        sa.Column("judged_ns", sa.BigInteger),
     )
     op.create_table(
         "keyframes_now",
@@ -97,14 +98,12 @@ def _present() -> None:
         "pairs_now",
         sa.Column("a", _ID, primary_key=True),
         sa.Column("b", _ID, primary_key=True),
-        sa.Column("computed_ns", sa.BigInteger, nullable=False),
-        sa.Column("overlap_a", sa.Double, nullable=False),
-        sa.Column("overlap_b", sa.Double, nullable=False),
-        *[sa.Column(name, sa.Double) for name in ("low_a", "high_a", "low_b", "high_b")],
-        sa.Column("boot_a", sa.Text, nullable=False),
-        sa.Column("sequence_a", sa.BigInteger, nullable=False),
-        sa.Column("boot_b", sa.Text, nullable=False),
-        sa.Column("sequence_b", sa.BigInteger, nullable=False),
+        sa.Column("computed_ns", sa.BigInteger),
+        *[sa.Column(name, sa.Double) for name in ("overlap_a", "overlap_b", "low_a", "high_a", "low_b", "high_b")],
+        sa.Column("boot_a", sa.Text),
+        sa.Column("sequence_a", sa.BigInteger),
+        sa.Column("boot_b", sa.Text),
+        sa.Column("sequence_b", sa.BigInteger),
         sa.Column("pose_time_a_ns", sa.BigInteger),
         sa.Column("pose_time_b_ns", sa.BigInteger),
     )
