@@ -27,7 +27,7 @@ from covista_service.link.publish import Publisher
 from covista_service.link.queries import Queries
 from covista_service.link.session import open_session
 from covista_service.loop import Loop
-        grouping=answers.grouping_options(settings.live),
+from covista_service.station.options import StationOptions
 from covista_service.station.station import Station
 from covista_service.store.archive import Archive
 from covista_service.store.database import check_url
@@ -182,25 +182,5 @@ def _station_options(settings: Settings, capacity: int) -> StationOptions:
         decay_after_s=settings.decay_after_s,
         unknown_after_s=settings.unknown_after_s,
         retry_after_s=settings.retry_after_s,
-<<<<<<< HEAD
-        revision=revision,
         grouping=answers.grouping_options(settings.live),
-=======
-        grouping=_grouping_options(settings.live),
-    )
-
-
-def _grouping_options(live: LiveSettings) -> GroupingOptions:
-    groups = live.groups
-    bounds = (groups.min, groups.max) if isinstance(groups, GroupBounds) else groups
-    return GroupingOptions(
-        alpha=live.alpha,
-        groups=bounds,
-        min_group_size=live.min_group_size,
-        sigma=live.sigma,
-        criterion=live.criterion,
-        grouping=live.grouping,
-        hysteresis=HysteresisOptions(live.hysteresis.gain, live.hysteresis.persistence_s),
-        smoothing=live.hysteresis.smoothing,
->>>>>>> h-core
     )
