@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
 from pydantic.config import JsonDict
@@ -77,6 +78,11 @@ class LiveSettings(Report):
     hysteresis: Hysteresis = Field(default=Hysteresis(), description="How steady groups on show are.")
 
 
+# A patch part by part: the name of a setting, or of a part of one after a dot, as in hysteresis.gain.
+Patch = Mapping[str, Any]
+_PARTED = "hysteresis"
+
+
 def _without_defaults(schema: JsonDict) -> None:
     """In a patch, what is left out stays as it is: defaults would say otherwise."""
     properties = schema.get("properties")
@@ -106,3 +112,29 @@ class SettingsPatch(LiveSettings):
         default="auto", description="auto, a number of groups, or bounds on it: {min, max}, both, 1 <= min <= max."
     )
     hysteresis: HysteresisPatch = Field(default=HysteresisPatch(), description="How steady groups on show are.")
+
+
+def flat(patch: SettingsPatch) -> Patch:
+    """What a patch names, part by part, as JSON has it: so that later patches can be laid over it."""
+    return dict(parts_of(patch.model_dump(mode="json", exclude_unset=True)))
+
+
+def patched(live: LiveSettings, patch: Patch) -> LiveSettings:
+    """The settings with a flat patch laid over them. Raises ValidationError for what makes no sense."""
+    values = live.model_dump()
+    for name, value in patch.items():
+        whole, dot, part = name.partition(".")
+        if dot and whole == _PARTED:
+            values[whole] = {**values[whole], part: value}
+        else:
+            values[name] = value
+    return LiveSettings.model_validate(values)
+
+
+def parts_of(values: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Settings by name, parts of the hysteresis by themselves."""
+    for name, value in values.items():
+        if name == _PARTED:
+            yield from ((f"{name}.{part}", each) for part, each in value.items())
+        else:
+            yield name, value

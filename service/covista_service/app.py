@@ -16,8 +16,9 @@ from covista_service import answers
 from covista_service.access import Gate, Keyring, TokenError, TokenWatch, check_listening, is_loopback
 from covista_service.api import rest
 from covista_service.api.deps import Parts, State
+from covista_service.api.stream import Stream
 from covista_service.api.vitals import Vitals
-from covista_service.config import Settings
+from covista_service.config import Settings, with_stored
 from covista_service.grouping.warming import warm_up
 from covista_service.link.inbox import Inbox
 from covista_service.link.ingest import Ingest
@@ -90,6 +91,8 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
         history = await asyncio.to_thread(lambda: History(settings.database, retention=retention))
         close_later(history.close)
         gate, watch = await asyncio.to_thread(_open_gate, settings, close_later)
+        settings = with_stored(settings, history.stored_settings())
+        stream = Stream(history.last.event + 1)
         telemetry = Telemetry()
         options = WorkersOptions(settings.workers, settings.workers_count)
         workers = await asyncio.to_thread(Workers, options, telemetry.took)
@@ -101,7 +104,7 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
             station,
             Inbox(mailboxes),
             workers,
-            (publisher, history),
+            (publisher, history, stream),
             telemetry,
             next_event=memory.event + 1,
         )
@@ -126,7 +129,17 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
             )
 
         log.info("starts", extra=about(**settings.shown))
-        yield Parts(loop, telemetry, health_now, vitals_now, secrets.token_hex(4), gate)
+        yield Parts(
+            loop,
+            telemetry,
+            health_now,
+            vitals_now,
+            secrets.token_hex(4),
+            gate,
+            archive=archive,
+            flush=history.flush,
+            stream=stream,
+        )
         log.info("stops", extra=about(surveys=telemetry.summary().surveys))
 
 

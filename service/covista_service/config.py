@@ -1,7 +1,8 @@
-"""The settings of the station: flags > environment (COVISTA_*) > file (TOML) > defaults."""
+"""The settings of the station: flags > environment (COVISTA_*) > given while it ran > file (TOML) > defaults."""
 
 from __future__ import annotations
 
+import logging
 import re
 import tomllib
 from collections.abc import Mapping
@@ -11,12 +12,21 @@ from urllib.parse import urlsplit
 
 from covista_schemas.errors import CovistaError, LinkError
 from covista_schemas.keys import ID_PATTERN
-from covista_schemas.reports import Hysteresis, LiveSettings
+from covista_schemas.settings import Hysteresis, LiveSettings, Patch, patched
 from covista_schemas.zenoh_config import check_endpoint
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, model_validator
-from pydantic_settings import BaseSettings, InitSettingsSource, NoDecode, PydanticBaseSettingsSource, SettingsConfigDict
+from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, ValidationError, model_validator
+from pydantic_settings import (
+    BaseSettings,
+    EnvSettingsSource,
+    InitSettingsSource,
+    NoDecode,
+    PydanticBaseSettingsSource,
+    SettingsConfigDict,
+)
 from sqlalchemy.engine import make_url
 from sqlalchemy.exc import ArgumentError
+
+log = logging.getLogger(__name__)
 
 PREFIX = "COVISTA_"
 # Settings that are flags of `serve` too.
@@ -150,6 +160,14 @@ class Settings(LiveSettings, BaseSettings):
     unknown_after_s: Seconds = Field(default=600, description="An overlap is unknown when it is older than this.")
     retry_after_s: Seconds = Field(default=30, description="No pair whose views cannot meet is tried again sooner.")
 
+    # Names of live settings, with a dot before parts, that came with flags or from the environment.
+    _pinned: frozenset[str] = PrivateAttr(default=frozenset())
+
+    @property
+    def pinned(self) -> frozenset[str]:
+        """Live settings, or parts such as hysteresis.gain, that flags or the environment say: nothing stored does."""
+        return self._pinned
+
     @property
     def api_address(self) -> Address:
         """Where the REST interface listens."""
@@ -211,7 +229,36 @@ def load(flags: Mapping[str, object] | None = None, file: Path | None = None) ->
     except ValidationError as error:
         raise SettingsError(_one_line(error)) from error
     # A class that every process can import, for settings that travel to one.
-    return Settings.model_construct(**dict(layered))
+    settings = Settings.model_construct(**dict(layered))
+    settings._pinned = _names(flags or {}) | _names(EnvSettingsSource(Settings)())
+    return settings
+
+
+def with_stored(settings: Settings, stored: Patch) -> Settings:
+    """The settings with those laid over that were given while the station ran, but for what is pinned.
+
+    What makes no sense any more is left out, with a warning.
+    """
+    live = settings.live
+    for name, value in stored.items():
+        if name in settings.pinned or name.partition(".")[0] in settings.pinned:
+            continue
+        try:
+            live = patched(live, {name: value})
+        except ValidationError:
+            log.warning("a stored setting makes no sense any more and is left out: %s", name)
+    found = settings.model_copy(update={name: getattr(live, name) for name in LiveSettings.model_fields})
+    found._pinned = settings.pinned
+    return found
+
+
+def _names(values: Mapping[str, object]) -> frozenset[str]:
+    """Names of the live settings among them; parts of the hysteresis by themselves."""
+    parts = values.get("hysteresis")
+    whole = {name for name in LiveSettings.model_fields if name in values}
+    if isinstance(parts, Mapping):
+        whole = whole - {"hysteresis"} | {f"hysteresis.{part}" for part in parts}
+    return frozenset(whole)
 
 
 def _read(file: Path) -> dict[str, object]:

@@ -76,7 +76,7 @@ async def _serve(
 
     def connection(**given: Any) -> Connection:
         parts: Parts = (state or {})["parts"]
-        return Connection(**given, given_up=parts.outgoing.given_up)
+        return Connection(**given, given_up=parts.outgoing.given_up, listening=lambda: parts.stream.listeners)
 
     server = _Server(
         uvicorn.Config(
@@ -103,13 +103,15 @@ async def _serve(
             parts: Parts = state["parts"]
             running = Running(_url(settings, listener), settings.link, parts.telemetry.summary, server.stop)
             server.when_started = (lambda: ready(running)) if ready else _nothing
+            server.when_stopping = parts.stream.close
             await server.serve([listener])
 
 
 class _Server(uvicorn.Server):
-    """Uvicorn's server, that leaves signals to us and says when it listens."""
+    """Uvicorn's server, that leaves signals to us and says when it listens and when it stops."""
 
     when_started: Callable[[], None]
+    when_stopping: Callable[[], None]
 
     def stop(self) -> None:
         """Stop soon; at once when told twice."""
@@ -119,6 +121,11 @@ class _Server(uvicorn.Server):
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
         self.when_started()
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        # What has no end by itself would keep the server waiting.
+        self.when_stopping()
+        await super().shutdown(sockets)
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:

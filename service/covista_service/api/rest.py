@@ -9,9 +9,10 @@ from fastapi import APIRouter, FastAPI
 from starlette.middleware.cors import CORSMiddleware
 from starlette.types import ASGIApp, Lifespan, Receive, Scope, Send
 
-from covista_service.api import contract, errors, groups, health, pairs, robots, similarity
+from covista_service.api import contract, errors, events, groups, health, pairs, robots, settings, similarity
 from covista_service.api.bodies import bounded
 from covista_service.api.guard import guarded
+from covista_service.api.listening import HEAD_ONLY
 from covista_service.api.timing import PREFIX, timed
 
 _METHODS = ("GET", "HEAD", "POST", "PATCH", "DELETE")
@@ -29,8 +30,8 @@ def build(lifespan: Lifespan[FastAPI] | None = None, cors_origins: Sequence[str]
         redoc_url=None,
     )
     nouns = APIRouter(prefix=PREFIX, responses=errors.describe(422, 500))
-    for router in (robots.router, pairs.router, similarity.router, groups.router):
-        nouns.include_router(router)
+    for noun in (robots, pairs, similarity, groups, events, settings):
+        nouns.include_router(noun.router)
     app.include_router(nouns)
     app.include_router(health.router)
     errors.install(app)
@@ -58,6 +59,6 @@ def _head_as_get(app: ASGIApp) -> ASGIApp:
 
     async def answer(scope: Scope, receive: Receive, send: Send) -> None:
         asked_for_head = scope["type"] == "http" and scope["method"] == "HEAD"
-        await app({**scope, "method": "GET"} if asked_for_head else scope, receive, send)
+        await app({**scope, "method": "GET", HEAD_ONLY: True} if asked_for_head else scope, receive, send)
 
     return answer

@@ -95,7 +95,7 @@ def test_what_is_malformed_is_named(desk: Desk) -> None:
 
 
 def test_methods_that_are_not_there_are_a_problem_that_names_those_that_are(desk: Desk) -> None:
-    response = desk.ask("/api/v1/robots", "DELETE")
+    response = desk.ask("/api/v1/robots", "PUT")
     assert (response.status_code, response.headers["content-type"]) == (405, "application/problem+json")
     assert response.headers["allow"] == "GET"
 
