@@ -51,6 +51,12 @@ class Keyring:
         """How many tokens let somebody in."""
         return sum(token.revoked_us is None for token in self._known.values())
 
+    def lets_in(self, name: str | None) -> bool:
+        """Whether who came with the token of this name, or with none, would still be let in."""
+        if name is None:
+            return self._door is Door.OPEN
+        return any(token.name == name and token.revoked_us is None for token in self._known.values())
+
     def take(self, found: Sequence[Token]) -> None:
         """All tokens, as they were read just now."""
         known = dict(self._known)

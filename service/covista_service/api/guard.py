@@ -7,16 +7,19 @@ description is the same for every station.
 
 from __future__ import annotations
 
+import asyncio
 from http import HTTPStatus
 from ipaddress import ip_address
+from typing import Any
 
 from covista_schemas.reports import Problem
 from fastapi import Response
 from starlette.datastructures import Headers
-from starlette.types import ASGIApp, Receive, Send
+from starlette.types import ASGIApp, Message, Receive, Send
 from starlette.types import Scope as Request
 
 from covista_service.access import Admitted, Gate, Refusal, Refused, Scope, is_loopback
+from covista_service.api.delivery import CUT
 from covista_service.api.deps import State
 from covista_service.api.errors import refuse
 from covista_service.api.timing import PREFIX
@@ -72,9 +75,43 @@ def guarded(app: ASGIApp) -> ASGIApp:
             await _refusal(found, scope["path"], wanted)(scope, receive, send)
             return
         scope[BY] = found.by
-        await app(scope, receive, send)
+        await app(scope, receive, send if wanted is None else _while_let_in(scope, found.by, send))
 
     return answer
+
+
+def _while_let_in(scope: Request, by: str | None, send: Send) -> Send:
+    """Sends until the token is revoked: a stream of events would outlive it by days."""
+    keyring = _gate_of(scope).keyring
+    over = False
+
+    async def sending(message: Message) -> None:
+        nonlocal over
+        if over:
+            return
+        if message["type"] == "http.response.body" and not keyring.lets_in(by):
+            over = True
+            await _cut(scope, send)
+            return
+        await send(message)
+
+    return sending
+
+
+async def _cut(scope: Request, send: Send) -> None:
+    """End an answer short, so that nobody takes it for whole."""
+    extensions: dict[str, Any] = scope.get("extensions") or {}
+    if CUT in extensions:
+        extensions[CUT]()
+        # The server must hear that the connection is gone before the answer ends.
+        await asyncio.sleep(0)
+    else:
+        await send({"type": "http.response.body", "body": b"", "more_body": False})
+
+
+def _gate_of(scope: Request) -> Gate:
+    state: State = scope["state"]
+    return state["parts"].gate
 
 
 async def _hang_up(send: Send) -> None:
@@ -82,8 +119,7 @@ async def _hang_up(send: Send) -> None:
 
 
 async def _judge(scope: Request, wanted: Scope) -> Admitted | Refused:
-    state: State = scope["state"]
-    gate = state["parts"].gate
+    gate = _gate_of(scope)
     headers = Headers(scope=scope)
     address = str((scope.get("client") or ("",))[0])
     found = await gate.admit(headers.getlist("authorization"), wanted, address)

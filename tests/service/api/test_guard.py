@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -10,6 +11,7 @@ from covista_service.access import Attempts, Gate, Keyring, Scope
 from covista_service.access.tokens import new_secret
 from covista_service.api import guard
 from fastapi import Request
+from fastapi.responses import StreamingResponse
 
 from tests.service.access.sources import Shelf
 from tests.service.api.conftest import Desk, open_gate
@@ -31,7 +33,7 @@ class Guarded:
     """A desk behind a gate with tokens of each kind."""
 
     def __init__(self, most: int = 10_000) -> None:
-        shelf = Shelf()
+        self.shelf = shelf = Shelf()
         self.reader = shelf.add("reader", Scope.READ)
         self.operator = shelf.add("operator", Scope.OPERATE)
         self.revoked = shelf.add("revoked", Scope.OPERATE)
@@ -214,6 +216,25 @@ def test_routes_are_told_who_asks() -> None:
     open_desk.app.get("/who")(who)
     open_desk.ask("/who")
     assert asked == ["operator", None]
+
+
+@pytest.mark.parametrize("open_at_first", [False, True])
+def test_an_answer_under_way_ends_when_its_token_is_revoked_or_the_first_one_made(open_at_first: bool) -> None:
+    guarded = Guarded()
+    desk = Desk() if open_at_first else guarded.desk
+
+    def parts() -> Iterator[str]:
+        yield "before"
+        if not open_at_first:
+            guarded.shelf.revoke("reader")
+        desk.gate.keyring.take(guarded.shelf.read())
+        yield "after"
+        yield "later"
+
+    desk.app.get("/stream")(lambda: StreamingResponse(parts()))
+    token = {} if open_at_first else {"authorization": f"Bearer {guarded.reader}"}
+    assert desk.ask("/stream", **token).text == "before"
+    assert desk.ask("/stream", **token).status_code == 401
 
 
 def test_every_operation_says_which_token_it_takes_and_what_comes_without_it(guarded: Guarded) -> None:
