@@ -14,13 +14,15 @@ from covista_schemas.report import Report
 MOST_GROUPS = 1_000_000
 
 
-class GroupBounds(Report):
-    """Least and largest number of groups to consider."""
-
+class _Bounds(Report):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     min: int = Field(ge=1, le=MOST_GROUPS)
     max: int = Field(ge=1, le=MOST_GROUPS)
+
+
+class GroupBounds(_Bounds):
+    """Least and largest number of groups to consider."""
 
     @model_validator(mode="after")
     def _order(self) -> Self:
@@ -91,8 +93,8 @@ def _without_defaults(schema: JsonDict) -> None:
             each.pop("default", None)
 
 
-class GroupBoundsPatch(GroupBounds):
-    """Least and largest number of groups to consider, both."""
+class GroupBoundsPatch(_Bounds):
+    """Least and largest number of groups to consider, both; that they are in order is for `patched` to see."""
 
     model_config = ConfigDict(strict=True)
 
@@ -108,7 +110,7 @@ class SettingsPatch(LiveSettings):
 
     model_config = ConfigDict(strict=True, json_schema_extra=_without_defaults)
 
-    groups: Literal["auto"] | Annotated[int, Field(ge=1, le=MOST_GROUPS)] | GroupBoundsPatch = Field(
+    groups: Literal["auto"] | Annotated[int, Field(ge=1, le=MOST_GROUPS)] | GroupBoundsPatch = Field(  # type: ignore[assignment]  # looser
         default="auto", description="auto, a number of groups, or bounds on it: {min, max}, both, 1 <= min <= max."
     )
     hysteresis: HysteresisPatch = Field(default=HysteresisPatch(), description="How steady groups on show are.")

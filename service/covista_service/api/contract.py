@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from covista_schemas.reports import Problem
+from covista_schemas.reports import EventsMissed, Problem
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
@@ -44,7 +45,8 @@ def _corrected(description: Description) -> Description:
         elif content.get("application/json", {}).get("schema") == _PROBLEM:
             response["content"] = {PROBLEM_JSON: content["application/json"]}
     schemas = description["components"]["schemas"]
-    schemas.setdefault("Problem", Problem.model_json_schema())
+    for model in (Problem, EventsMissed):
+        schemas.setdefault(model.__name__, model.model_json_schema())
     for name in _UNUSED:
         schemas.pop(name, None)
     return description
@@ -54,3 +56,12 @@ def _responses(description: Description) -> Iterator[tuple[str, Description]]:
     for path in description["paths"].values():
         for operation in path.values():
             yield from operation["responses"].items()
+
+
+def methods_of(description: Description, path: str) -> list[str]:
+    """What may be done with a path, by all routes that it fits; HEAD wherever GET may."""
+    found: set[str] = set()
+    for template, operations in description["paths"].items():
+        if re.fullmatch(re.sub(r"\\{[^}]*\\}", "[^/]+", re.escape(template)), path):
+            found |= {method.upper() for method in operations}
+    return sorted(found | ({"HEAD"} if "GET" in found else set()))

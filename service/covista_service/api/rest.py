@@ -26,7 +26,7 @@ def build(lifespan: Lifespan[FastAPI] | None = None) -> FastAPI:
         nouns.include_router(noun.router)
     app.include_router(nouns)
     app.include_router(health.router)
-    errors.install(app)
+    errors.install(app, lambda path: contract.methods_of(app.openapi(), path))
     app.add_middleware(timed)
     app.add_middleware(_head_as_get)
     # FastAPI's way to replace its own description is to assign the method.

@@ -46,12 +46,12 @@ ERRORS = {
     ("/groups", "get"): set(),
     ("/groups/history", "get"): {"409", "503"},
     ("/groups/at", "get"): {"404", "503"},
-    ("/groups/preview", "post"): {"400", "503"},
+    ("/groups/preview", "post"): {"400", "409", "503"},
     ("/groups/{label}", "get"): {"404"},
     ("/events", "get"): {"503"},
     ("/events/history", "get"): {"409", "503"},
     ("/settings", "get"): set(),
-    ("/settings", "patch"): {"400", "503"},
+    ("/settings", "patch"): {"400", "409", "503"},
 }
 NO_JSON = {("/pairs/{a}/{b}/overlay.png", "get"), ("/events", "get"), ("/robots/{robot}", "delete")}
 
