@@ -37,6 +37,9 @@ def describe(app: FastAPI) -> Callable[[], Description]:
 
 
 def _corrected(description: Description) -> Description:
+    for path in description["paths"].values():
+        for operation in path.values():
+            _given(operation)
     for status, response in _responses(description):
         content = response.get("content", {})
         if status == "422":
@@ -58,10 +61,23 @@ def _responses(description: Description) -> Iterator[tuple[str, Description]]:
             yield from operation["responses"].items()
 
 
+def _given(operation: Description) -> None:
+    """What is left out of a question is no null, as models have it."""
+    for parameter in operation.get("parameters", []):
+        schema = parameter["schema"]
+        kinds = [kind for kind in schema.get("anyOf", []) if kind != {"type": "null"}]
+        if len(kinds) == 1:
+            del schema["anyOf"]
+            schema.update(kinds[0])
+
+
 def methods_of(description: Description, path: str) -> list[str]:
-    """What may be done with a path, by all routes that it fits; HEAD wherever GET may."""
-    found: set[str] = set()
-    for template, operations in description["paths"].items():
-        if re.fullmatch(re.sub(r"\\{[^}]*\\}", "[^/]+", re.escape(template)), path):
-            found |= {method.upper() for method in operations}
+    """What may be done with a path: with itself if it is told of, else with those that it is one of. GET means HEAD."""
+    fitting = [template for template in description["paths"] if _fits(template, path)]
+    named = [path] if path in fitting else fitting
+    found = {method.upper() for template in named for method in description["paths"][template]}
     return sorted(found | ({"HEAD"} if "GET" in found else set()))
+
+
+def _fits(template: str, path: str) -> bool:
+    return re.fullmatch(re.sub(r"\\{[^}]*\\}", "[^/]+", re.escape(template)), path) is not None

@@ -128,3 +128,9 @@ def test_every_reference_leads_somewhere(description: dict[str, Any]) -> None:
 
     schemas = {f"#/components/schemas/{name}" for name in description["components"]["schemas"]}
     assert references(description) <= schemas
+
+
+def test_no_parameter_may_be_null(description: dict[str, Any]) -> None:
+    for path in description["paths"].values():
+        for operation in path.values():
+            assert "null" not in str([each["schema"] for each in operation.get("parameters", [])])

@@ -143,6 +143,13 @@ def test_text_that_a_page_of_others_may_send_unasked_is_no_patch(desk: Desk) -> 
     assert desk.get("/settings").json()["alpha"] == 0.5
 
 
+def test_a_whole_number_may_be_written_with_a_point(desk: Desk) -> None:
+    settings = desk.send("PATCH", "/settings", '{"groups": 2.0, "min_group_size": 1e0}').json()
+    assert (settings["groups"], settings["min_group_size"]) == (2, 1)
+    bounds = desk.send("PATCH", "/settings", '{"groups": {"min": 1.0, "max": 2.0}}').json()["groups"]
+    assert bounds == {"min": 1, "max": 2}
+
+
 def test_more_groups_than_robots_is_a_note(desk: Desk) -> None:
     assert desk.send("PATCH", "/settings", {"groups": 50}).status_code == 200
     assert "cannot form 50 groups" in desk.get("/groups").json()["note"]
