@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 from pydantic.config import JsonDict
 
 from covista_schemas.report import Report
@@ -14,13 +14,15 @@ from covista_schemas.report import Report
 MOST_GROUPS = 1_000_000
 
 
-class GroupBounds(Report):
-    """Least and largest number of groups to consider."""
-
+class _Bounds(Report):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     min: int = Field(ge=1, le=MOST_GROUPS)
     max: int = Field(ge=1, le=MOST_GROUPS)
+
+
+class GroupBounds(_Bounds):
+    """Least and largest number of groups to consider."""
 
     @model_validator(mode="after")
     def _order(self) -> Self:
@@ -91,10 +93,21 @@ def _without_defaults(schema: JsonDict) -> None:
             each.pop("default", None)
 
 
-class GroupBoundsPatch(GroupBounds):
-    """Least and largest number of groups to consider, both."""
+def _whole(value: object) -> object:
+    """JSON has one kind of numbers: 3.0 is a whole one."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+_Count = Annotated[int, Field(ge=1, le=MOST_GROUPS), BeforeValidator(_whole)]
+
+
+class GroupBoundsPatch(_Bounds):
+    """Least and largest number of groups to consider, both; that they are in order is for `patched` to see."""
 
     model_config = ConfigDict(strict=True)
+
+    min: _Count
+    max: _Count
 
 
 class HysteresisPatch(Hysteresis):
@@ -108,9 +121,10 @@ class SettingsPatch(LiveSettings):
 
     model_config = ConfigDict(strict=True, json_schema_extra=_without_defaults)
 
-    groups: Literal["auto"] | Annotated[int, Field(ge=1, le=MOST_GROUPS)] | GroupBoundsPatch = Field(
+    groups: Literal["auto"] | _Count | GroupBoundsPatch = Field(  # type: ignore[assignment]  # looser
         default="auto", description="auto, a number of groups, or bounds on it: {min, max}, both, 1 <= min <= max."
     )
+    min_group_size: _Count = Field(default=1, description="How many robots a group has at least.")
     hysteresis: HysteresisPatch = Field(default=HysteresisPatch(), description="How steady groups on show are.")
 
 

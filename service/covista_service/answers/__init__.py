@@ -8,7 +8,7 @@ from covista_service.answers.grouping import (
     similarity_report,
 )
 from covista_service.answers.matrices import Matrix, matrix_csv, matrix_npy
-from covista_service.answers.pages import pairs_page, robots_page
+from covista_service.answers.pages import PAIR_CURSOR, ROBOT_CURSOR, pairs_page, robots_page
 from covista_service.answers.pairs import common_regions, explaining_survey, find_pair, pair_report, pairs_report
 from covista_service.answers.pieces import pairs_json, similarity_json
 from covista_service.answers.robots import find_robot, robot_report, robots_report
@@ -16,6 +16,8 @@ from covista_service.answers.settings import changes, grouping_options, live_set
 from covista_service.answers.unknown import NotKnownError, problem_of
 
 __all__ = [
+    "PAIR_CURSOR",
+    "ROBOT_CURSOR",
     "Matrix",
     "NotKnownError",
     "changes",

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import binascii
 import re
 from collections.abc import Iterator
 from itertools import islice
@@ -18,10 +16,14 @@ from covista_service.station.events import Pair
 from covista_service.station.pairs import pair_of
 from covista_service.station.snapshot import Snapshot
 
+# What cursors look like: every word of the form is one, for there is a place behind every id.
+ROBOT_CURSOR = rf"^{ID_PATTERN}\.$"
+PAIR_CURSOR = rf"^{ID_PATTERN}\.{ID_PATTERN}$"
+
 
 def robots_page(snapshot: Snapshot, cursor: str | None = None, limit: int | None = None) -> reports.RobotsReport:
     """Robots after a cursor, `limit` of them at most. Raises CursorError."""
-    (after,) = ("",) if cursor is None else _read(cursor, 1)
+    after = "" if cursor is None else _read(ROBOT_CURSOR, cursor)[0]
     names = [robot for robot in snapshot.robots if robot > after]
     page = names[:limit]
     more = len(page) < len(names)
@@ -34,7 +36,7 @@ def pairs_page(
     snapshot: Snapshot, robot: str | None, min_overlap: float | None, cursor: str | None, limit: int | None
 ) -> reports.PairsReport:
     """Pairs after a cursor as `pairs_report` lists them, `limit` at most. Raises CursorError and NotKnownError."""
-    after = None if cursor is None else _pair(cursor)
+    after = None if cursor is None else _read(PAIR_CURSOR, cursor)
     if robot is not None:
         find_robot(snapshot, robot)
     listed = (
@@ -61,21 +63,12 @@ def _pairs(snapshot: Snapshot, robot: str | None, after: Pair | None, *, recorde
                 yield from ((first, other) for other in names[i + 1 :] if after is None or (first, other) > after)
 
 
-def _written(*ids: str) -> str:
-    return base64.urlsafe_b64encode(" ".join(ids).encode()).decode().rstrip("=")
+def _written(first: str, second: str = "") -> str:
+    return f"{first}.{second}"
 
 
-def _read(cursor: str, count: int) -> list[str]:
-    try:
-        text = base64.b64decode(cursor + "=" * (-len(cursor) % 4), b"-_", validate=True).decode("ascii")
-    except (binascii.Error, ValueError) as error:
-        raise CursorError("cursor: not one that a page has given") from error
-    ids = text.split(" ")
-    if len(ids) != count or not all(re.fullmatch(ID_PATTERN, each) for each in ids):
+def _read(form: str, cursor: str) -> Pair:
+    if not re.fullmatch(form, cursor):
         raise CursorError("cursor: not one that a page of this list has given")
-    return ids
-
-
-def _pair(cursor: str) -> Pair:
-    first, second = _read(cursor, 2)
+    first, _, second = cursor.partition(".")
     return first, second

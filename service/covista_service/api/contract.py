@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from covista_schemas.reports import Problem
+from covista_schemas.reports import EventsMissed, Problem
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
@@ -54,6 +55,9 @@ def describe(app: FastAPI) -> Callable[[], Description]:
 
 
 def _corrected(description: Description) -> Description:
+    for path in description["paths"].values():
+        for operation in path.values():
+            _given(operation)
     for status, response in _responses(description):
         content = response.get("content", {})
         if status == "422":
@@ -62,7 +66,8 @@ def _corrected(description: Description) -> Description:
         elif content.get("application/json", {}).get("schema") == _PROBLEM:
             response["content"] = {PROBLEM_JSON: content["application/json"]}
     schemas = description["components"]["schemas"]
-    schemas.setdefault("Problem", Problem.model_json_schema())
+    for model in (Problem, EventsMissed):
+        schemas.setdefault(model.__name__, model.model_json_schema())
     description["components"]["securitySchemes"] = {_SECURITY: _SCHEME}
     for path, method, operation in _operations(description):
         _secure(path, method, operation)
@@ -93,3 +98,25 @@ def _operations(description: Description) -> Iterator[tuple[str, str, Descriptio
 def _responses(description: Description) -> Iterator[tuple[str, Description]]:
     for _, _, operation in _operations(description):
         yield from operation["responses"].items()
+
+
+def _given(operation: Description) -> None:
+    """What is left out of a question is no null, as models have it."""
+    for parameter in operation.get("parameters", []):
+        schema = parameter["schema"]
+        kinds = [kind for kind in schema.get("anyOf", []) if kind != {"type": "null"}]
+        if len(kinds) == 1:
+            del schema["anyOf"]
+            schema.update(kinds[0])
+
+
+def methods_of(description: Description, path: str) -> list[str]:
+    """What may be done with a path: with itself if it is told of, else with those that it is one of. GET means HEAD."""
+    fitting = [template for template in description["paths"] if _fits(template, path)]
+    named = [path] if path in fitting else fitting
+    found = {method.upper() for template in named for method in description["paths"][template]}
+    return sorted(found | ({"HEAD"} if "GET" in found else set()))
+
+
+def _fits(template: str, path: str) -> bool:
+    return re.fullmatch(re.sub(r"\\{[^}]*\\}", "[^/]+", re.escape(template)), path) is not None

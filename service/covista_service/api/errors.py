@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from http import HTTPStatus
 from typing import Any
 
@@ -45,13 +45,21 @@ _KINDS: Mapping[type[Exception], tuple[int, str, int | None]] = {
 }
 
 
-def install(app: FastAPI) -> None:
-    """Have every error of the app answered with a problem."""
+def install(app: FastAPI, methods_of: Callable[[str], Sequence[str]]) -> None:
+    """Have every error of the app answered with a problem; `methods_of` tells what may be done with a path."""
+
+    def refused(request: Request, error: Exception) -> Response:
+        response = _refused(request, error)
+        if response.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
+            # That of the first route alone is what the framework knows.
+            response.headers["allow"] = ", ".join(methods_of(request.url.path))
+        return response
+
     app.add_exception_handler(NotKnownError, _not_known)
     for kind in _KINDS:
         app.add_exception_handler(kind, _gone_wrong)
     app.add_exception_handler(RequestValidationError, _not_valid)
-    app.add_exception_handler(HTTPException, _refused)
+    app.add_exception_handler(HTTPException, refused)
     app.add_exception_handler(Exception, _broken)
 
 

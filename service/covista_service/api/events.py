@@ -12,7 +12,7 @@ from covista_service.api import examples
 from covista_service.api.deps import PartsNow
 from covista_service.api.errors import describe
 from covista_service.api.listening import EVENT_STREAM, Listening
-from covista_service.api.past import PROBLEMS, CursorQuery, FromQuery, PageQuery, UntilQuery, read_past, span_ns
+from covista_service.api.past import PROBLEMS, FromQuery, HistoryCursor, PageQuery, UntilQuery, read_past, span_ns
 
 router = APIRouter(prefix="/events", tags=["events"])
 
@@ -25,10 +25,29 @@ LastIdQuery = Annotated[
 ]
 KindQuery = Annotated[list[EventKind] | None, Query(description="Only events of this kind, or of these.")]
 RobotQuery = Annotated[RobotId | None, Query(description="Only events that name this robot.")]
+# OpenAPI 3.1 has no word for streams: the schema is that of each event.
+_EVENT = {
+    "type": "object",
+    "description": "Each event of the stream.",
+    "properties": {
+        "id": {"type": "string", "pattern": "^[0-9]+$", "description": "Of the last event: for Last-Event-ID."},
+        "event": {"type": "string", "enum": [*EventKind, "reset", "cut"]},
+        "data": {
+            "type": "string",
+            "contentMediaType": "application/json",
+            "contentSchema": {
+                "anyOf": [
+                    {"$ref": f"#/components/schemas/{name}"} for name in ("EventReport", "EventsMissed", "Problem")
+                ]
+            },
+        },
+    },
+    "required": ["event", "data"],
+}
 _STREAM: dict[int | str, dict[str, Any]] = {
     200: {
         "description": "Events as they happen, until the client goes.",
-        "content": {EVENT_STREAM: {"schema": {"type": "string"}, "example": examples.STREAM}},
+        "content": {EVENT_STREAM: {"schema": _EVENT, "example": examples.STREAM}},
     }
 }
 
@@ -54,7 +73,7 @@ async def history(
     until: UntilQuery = None,
     kind: KindQuery = None,
     robot: RobotQuery = None,
-    cursor: CursorQuery = None,
+    cursor: HistoryCursor = None,
     limit: PageQuery = PAGE,
 ) -> Response:
     """What has happened, the oldest first. A page of one robot's events may be short and still not be the last."""

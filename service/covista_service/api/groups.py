@@ -16,8 +16,8 @@ from covista_service.api.deps import PartsNow, SnapshotNow, answer, answer_unles
 from covista_service.api.errors import describe
 from covista_service.api.past import (
     PROBLEMS,
-    CursorQuery,
     FromQuery,
+    HistoryCursor,
     Moment,
     PageQuery,
     UntilQuery,
@@ -46,7 +46,7 @@ async def history(
     parts: PartsNow,
     since: FromQuery = None,
     until: UntilQuery = None,
-    cursor: CursorQuery = None,
+    cursor: HistoryCursor = None,
     limit: PageQuery = PAGE,
 ) -> Response:
     """Revisions of the groups, the oldest first; the first may be of groups that stood before `from` no longer."""

@@ -18,10 +18,11 @@ from covista_service.api.deps import JSON, PartsNow, RobotPath, SnapshotNow, ans
 from covista_service.api.errors import describe
 from covista_service.api.past import (
     PROBLEMS,
-    CursorQuery,
     FromQuery,
+    HistoryCursor,
     LimitQuery,
     PageQuery,
+    PairsCursor,
     UntilQuery,
     read_past,
     span_ns,
@@ -49,7 +50,7 @@ async def pairs(
     robot: RobotQuery = None,
     min_overlap: ShareQuery = None,
     limit: LimitQuery = None,
-    cursor: CursorQuery = None,
+    cursor: PairsCursor = None,
 ) -> Response:
     """All pairs, each unordered pair once, in the order of their ids."""
     if robot is not None or limit is not None or cursor is not None:
@@ -74,7 +75,7 @@ async def history(
     parts: PartsNow,
     since: FromQuery = None,
     until: UntilQuery = None,
-    cursor: CursorQuery = None,
+    cursor: HistoryCursor = None,
     limit: PageQuery = PAGE,
 ) -> Response:
     """The overlap of a pair over time in the order asked for, thinned: a moment is kept where it is news.

@@ -11,6 +11,7 @@ from covista_schemas.reports import Report
 from fastapi import Query, Response
 from pydantic import BeforeValidator
 
+from covista_service import answers
 from covista_service.answers.past import Archive
 from covista_service.api.deps import Parts, answer
 from covista_service.api.errors import ContradictionError, describe
@@ -40,7 +41,11 @@ UntilQuery = Annotated[
     Moment | None,
     Query(alias="to", description="Only what is older than this (RFC 3339).", examples=["2026-05-04T13:00:00Z"]),
 ]
-CursorQuery = Annotated[str | None, Query(max_length=500, description="`next` of the page before, as it came.")]
+_NEXT = "`next` of the page before, as it came."
+# Any 16 bytes are a place in the history, and this is how they are written.
+HistoryCursor = Annotated[str | None, Query(pattern="^[A-Za-z0-9_-]{21}[AQgw]$", description=_NEXT)]
+RobotsCursor = Annotated[str | None, Query(pattern=answers.ROBOT_CURSOR, description=_NEXT)]
+PairsCursor = Annotated[str | None, Query(pattern=answers.PAIR_CURSOR, description=_NEXT)]
 PageQuery = Annotated[int, Query(ge=1, le=MOST, description="How many entries a page has at most.")]
 LimitQuery = Annotated[
     int | None, Query(ge=1, le=MOST, description="How many a page has at most; all there are without it.")

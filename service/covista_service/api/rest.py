@@ -34,7 +34,7 @@ def build(lifespan: Lifespan[FastAPI] | None = None, cors_origins: Sequence[str]
         nouns.include_router(noun.router)
     app.include_router(nouns)
     app.include_router(health.router)
-    errors.install(app)
+    errors.install(app, lambda path: contract.methods_of(app.openapi(), path))
     # The last one added is the first to hear of a request.
     app.add_middleware(bounded)
     app.add_middleware(guarded)

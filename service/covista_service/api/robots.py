@@ -12,10 +12,11 @@ from covista_service.api.deps import AskerNow, PartsNow, RobotPath, SnapshotNow,
 from covista_service.api.errors import describe
 from covista_service.api.past import (
     PROBLEMS,
-    CursorQuery,
     FromQuery,
+    HistoryCursor,
     LimitQuery,
     PageQuery,
+    RobotsCursor,
     UntilQuery,
     read_past,
     span_ns,
@@ -26,7 +27,7 @@ router = APIRouter(prefix="/robots", tags=["robots"])
 
 
 @router.get("", response_model=RobotsReport, responses={**examples.show(examples.ROBOTS), **describe(503)})
-def robots(parts: PartsNow, snapshot: SnapshotNow, limit: LimitQuery = None, cursor: CursorQuery = None) -> Response:
+def robots(parts: PartsNow, snapshot: SnapshotNow, limit: LimitQuery = None, cursor: RobotsCursor = None) -> Response:
     """All robots in the order of their ids: presence, group, pose, camera, and what became of their messages."""
     return answer(answers.robots_page(snapshot, cursor, limit), parts.outgoing)
 
@@ -43,7 +44,7 @@ async def track(
     parts: PartsNow,
     since: FromQuery = None,
     until: UntilQuery = None,
-    cursor: CursorQuery = None,
+    cursor: HistoryCursor = None,
     limit: PageQuery = PAGE,
 ) -> Response:
     """Where a robot was, thinned; also one that is forgotten by now. Empty for one that nothing is kept of."""

@@ -114,7 +114,7 @@ class Stream:
         buffer: int = BUFFER,
         listeners: int = LISTENERS,
         kept: int = KEPT,
-        longest_s: float = LONGEST_S,
+        longest_s: float | None = None,
     ) -> None:
         self._recent: deque[Told] = deque(maxlen=kept)
         self._next = next_event
@@ -125,7 +125,7 @@ class Stream:
         self._inside: dict[Listener, None] = {}
         self._hearing: dict[Listener, None] = {}
         self._closed = False
-        self.longest_s = longest_s
+        self.longest_s = LONGEST_S if longest_s is None else longest_s
         # Who was cut off or not let in, by reason.
         self.given_up: Counter[str] = Counter()
 

@@ -64,15 +64,11 @@ def test_a_page_goes_on_after_a_robot_that_is_gone_by_then() -> None:
 
 
 @pytest.mark.parametrize("path", ["/robots", "/pairs"])
-@pytest.mark.parametrize("cursor", ["nonsense", "%00", "A", "cg", "-", "cjEgcjIgcjM", "UjE", "ä"])
+@pytest.mark.parametrize("cursor", ["nonsense", "", ".", "%00", "R1.", "r1.r2.r3", "r1.%0A", "ä."])
 def test_what_no_page_has_given_is_malformed(desk: Desk, path: str, cursor: str) -> None:
     response = desk.get(f"{path}?cursor={cursor}")
-    if (path, cursor) == ("/robots", "cg"):
-        # The id of a robot that there is none of.
-        assert response.status_code == 200
-        return
     assert response.status_code == 422
-    assert Problem.model_validate_json(response.content).detail.startswith(("cursor", "query.cursor"))
+    assert "cursor" in Problem.model_validate_json(response.content).detail
 
 
 @pytest.mark.parametrize("path", ["/robots", "/pairs"])
