@@ -8,7 +8,7 @@ STACK := $(COMPOSE) --project-name covista --file docker/compose.yaml
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help demo test check bench up down compose-test
+.PHONY: help demo test check api-test bench up down compose-test
 
 help: ## Say what there is to make
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1: \2/p' Makefile
@@ -28,6 +28,10 @@ check: .venv/.dev ## Format, lint, types, contracts and tests: what must be gree
 	@$(BIN)/mypy
 	@said=$$($(BIN)/lint-imports) || { echo "$$said"; exit 1; }
 	@$(BIN)/pytest
+
+api-test: .venv/.dev ## Thousands of questions to every route, all answers held to the description
+	@echo "api-test: more than 5000 questions to a station, some minutes"
+	@COVISTA_API_EXAMPLES=250 COVISTA_API_CASES=5000 $(BIN)/pytest -s tests/service/api/test_schemathesis.py
 
 bench: .venv/.dev ## The benchmarks, beside their peers
 	@echo "bench: every benchmark in its short form"

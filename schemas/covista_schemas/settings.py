@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 from pydantic.config import JsonDict
 
 from covista_schemas.report import Report
@@ -13,13 +14,15 @@ from covista_schemas.report import Report
 MOST_GROUPS = 1_000_000
 
 
-class GroupBounds(Report):
-    """Least and largest number of groups to consider."""
-
+class _Bounds(Report):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     min: int = Field(ge=1, le=MOST_GROUPS)
     max: int = Field(ge=1, le=MOST_GROUPS)
+
+
+class GroupBounds(_Bounds):
+    """Least and largest number of groups to consider."""
 
     @model_validator(mode="after")
     def _order(self) -> Self:
@@ -77,6 +80,11 @@ class LiveSettings(Report):
     hysteresis: Hysteresis = Field(default=Hysteresis(), description="How steady groups on show are.")
 
 
+# A patch part by part: the name of a setting, or of a part of one after a dot, as in hysteresis.gain.
+Patch = Mapping[str, Any]
+_PARTED = "hysteresis"
+
+
 def _without_defaults(schema: JsonDict) -> None:
     """In a patch, what is left out stays as it is: defaults would say otherwise."""
     properties = schema.get("properties")
@@ -85,10 +93,21 @@ def _without_defaults(schema: JsonDict) -> None:
             each.pop("default", None)
 
 
-class GroupBoundsPatch(GroupBounds):
-    """Least and largest number of groups to consider, both."""
+def _whole(value: object) -> object:
+    """JSON has one kind of numbers: 3.0 is a whole one."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+_Count = Annotated[int, Field(ge=1, le=MOST_GROUPS), BeforeValidator(_whole)]
+
+
+class GroupBoundsPatch(_Bounds):
+    """Least and largest number of groups to consider, both; that they are in order is for `patched` to see."""
 
     model_config = ConfigDict(strict=True)
+
+    min: _Count
+    max: _Count
 
 
 class HysteresisPatch(Hysteresis):
@@ -102,7 +121,34 @@ class SettingsPatch(LiveSettings):
 
     model_config = ConfigDict(strict=True, json_schema_extra=_without_defaults)
 
-    groups: Literal["auto"] | Annotated[int, Field(ge=1, le=MOST_GROUPS)] | GroupBoundsPatch = Field(
+    groups: Literal["auto"] | _Count | GroupBoundsPatch = Field(  # type: ignore[assignment]  # looser
         default="auto", description="auto, a number of groups, or bounds on it: {min, max}, both, 1 <= min <= max."
     )
+    min_group_size: _Count = Field(default=1, description="How many robots a group has at least.")
     hysteresis: HysteresisPatch = Field(default=HysteresisPatch(), description="How steady groups on show are.")
+
+
+def flat(patch: SettingsPatch) -> Patch:
+    """What a patch names, part by part, as JSON has it: so that later patches can be laid over it."""
+    return dict(parts_of(patch.model_dump(mode="json", exclude_unset=True)))
+
+
+def patched(live: LiveSettings, patch: Patch) -> LiveSettings:
+    """The settings with a flat patch laid over them. Raises ValidationError for what makes no sense."""
+    values = live.model_dump()
+    for name, value in patch.items():
+        whole, dot, part = name.partition(".")
+        if dot and whole == _PARTED:
+            values[whole] = {**values[whole], part: value}
+        else:
+            values[name] = value
+    return LiveSettings.model_validate(values)
+
+
+def parts_of(values: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Settings by name, parts of the hysteresis by themselves."""
+    for name, value in values.items():
+        if name == _PARTED:
+            yield from ((f"{name}.{part}", each) for part, each in value.items())
+        else:
+            yield name, value

@@ -7,17 +7,18 @@ import logging
 import secrets
 import time
 from collections.abc import AsyncIterator, Callable
-from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from contextlib import AsyncExitStack, asynccontextmanager, closing, suppress
 
 from covista_schemas.reports import Health, PartHealth
 from fastapi import FastAPI
 
 from covista_service import answers
-from covista_service.access import check_listening
+from covista_service.access import Gate, Keyring, TokenError, TokenWatch, check_listening, is_loopback
 from covista_service.api import rest
 from covista_service.api.deps import Parts, State
+from covista_service.api.stream import Stream
 from covista_service.api.vitals import Vitals
-from covista_service.config import Settings
+from covista_service.config import Settings, with_stored
 from covista_service.grouping.warming import warm_up
 from covista_service.link.inbox import Inbox
 from covista_service.link.ingest import Ingest
@@ -32,6 +33,7 @@ from covista_service.store.archive import Archive
 from covista_service.store.database import check_url
 from covista_service.store.history import History
 from covista_service.store.retention import Retention
+from covista_service.store.tokens import Tokens
 from covista_service.telemetry import Telemetry, about
 from covista_service.workers import Workers, WorkersOptions, check_kind, daemon
 
@@ -44,10 +46,12 @@ _SILENT_S = 2.0
 def create_app(settings: Settings) -> FastAPI:
     """The station as an ASGI application; its lifespan opens and closes all.
 
-    Raises AccessError, DatabaseError or MissingExtraError.
+    Raises AccessError, DatabaseError, TokenError or MissingExtraError.
     """
-    check_listening(settings.api_address.host, settings.link, insecure=settings.insecure)
     check_url(settings.database)
+    check_listening(
+        settings.api_address.host, settings.link, insecure=settings.insecure, has_tokens=lambda: _has_tokens(settings)
+    )
     check_kind(settings.workers)
 
     @asynccontextmanager
@@ -55,7 +59,16 @@ def create_app(settings: Settings) -> FastAPI:
         async with _open_parts(settings) as parts:
             yield {"parts": parts}
 
-    return rest.build(lifespan)
+    return rest.build(lifespan, settings.cors_origins)
+
+
+def _has_tokens(settings: Settings) -> bool:
+    """Whether anybody can be let in. Raises TokenError, for who cannot know that must not listen to everybody."""
+    try:
+        with closing(Tokens(settings.database)) as tokens:
+            return any(token.revoked_us is None for token in tokens.read())
+    except TokenError as error:
+        raise TokenError(f"{error}; api = {settings.api} is not opened to the network before that is known") from error
 
 
 @asynccontextmanager
@@ -77,6 +90,9 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
         retention = Retention(settings.retention_days, settings.retention_mb)
         history = await asyncio.to_thread(lambda: History(settings.database, retention=retention))
         close_later(history.close)
+        gate, watch = await asyncio.to_thread(_open_gate, settings, close_later)
+        settings = with_stored(settings, history.stored_settings())
+        stream = Stream(history.last.event + 1)
         telemetry = Telemetry()
         options = WorkersOptions(settings.workers, settings.workers_count)
         workers = await asyncio.to_thread(Workers, options, telemetry.took)
@@ -88,7 +104,7 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
             station,
             Inbox(mailboxes),
             workers,
-            (publisher, history),
+            (publisher, history, stream),
             telemetry,
             next_event=memory.event + 1,
         )
@@ -100,7 +116,7 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
 
         def health_now() -> Health:
             moving = {"workers": _crew_health(workers, settings.workers)}
-            moving |= {"store": history.health(), "loop": _loop_health(loop, task)}
+            moving |= {"store": history.health(), "loop": _loop_health(loop, task), "access": watch.health()}
             return _health({"link": link, **moving})
 
         def vitals_now() -> Vitals:
@@ -113,8 +129,28 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
             )
 
         log.info("starts", extra=about(**settings.shown))
-        yield Parts(loop, telemetry, health_now, vitals_now, secrets.token_hex(4))
+        yield Parts(
+            loop,
+            telemetry,
+            health_now,
+            vitals_now,
+            secrets.token_hex(4),
+            gate,
+            archive=archive,
+            flush=history.flush,
+            stream=stream,
+        )
         log.info("stops", extra=about(surveys=telemetry.summary().surveys))
+
+
+def _open_gate(settings: Settings, close_later: Callable[[Callable[[], object]], None]) -> tuple[Gate, TokenWatch]:
+    """Who may ask, by tokens that are read for as long as the station runs."""
+    tokens = Tokens(settings.database)
+    close_later(tokens.close)
+    keyring = Keyring(locked=not (settings.insecure or is_loopback(settings.api_address.host)))
+    watch = TokenWatch(tokens, keyring)
+    close_later(watch.close)
+    return Gate(keyring, news=watch.news, any_host=settings.insecure), watch
 
 
 async def _run(loop: Loop) -> None:

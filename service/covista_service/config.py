@@ -1,21 +1,32 @@
-"""The settings of the station: flags > environment (COVISTA_*) > file (TOML) > defaults."""
+"""The settings of the station: flags > environment (COVISTA_*) > given while it ran > file (TOML) > defaults."""
 
 from __future__ import annotations
 
+import logging
 import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple, Self
+from urllib.parse import urlsplit
 
 from covista_schemas.errors import CovistaError, LinkError
 from covista_schemas.keys import ID_PATTERN
-from covista_schemas.reports import Hysteresis, LiveSettings
+from covista_schemas.settings import Hysteresis, LiveSettings, Patch, patched
 from covista_schemas.zenoh_config import check_endpoint
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, model_validator
-from pydantic_settings import BaseSettings, InitSettingsSource, NoDecode, PydanticBaseSettingsSource, SettingsConfigDict
+from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, ValidationError, model_validator
+from pydantic_settings import (
+    BaseSettings,
+    EnvSettingsSource,
+    InitSettingsSource,
+    NoDecode,
+    PydanticBaseSettingsSource,
+    SettingsConfigDict,
+)
 from sqlalchemy.engine import make_url
 from sqlalchemy.exc import ArgumentError
+
+log = logging.getLogger(__name__)
 
 PREFIX = "COVISTA_"
 # Settings that are flags of `serve` too.
@@ -71,11 +82,24 @@ def _check_workers(text: str) -> str:
     return text
 
 
+def _check_origin(text: str) -> str:
+    try:
+        parts = urlsplit(text)
+        whole = parts.scheme in ("http", "https") and parts.hostname and text == f"{parts.scheme}://{parts.netloc}"
+        _ = parts.port
+    except ValueError:
+        whole = False
+    if not whole or "@" in text or "*" in text or text != text.lower():
+        raise ValueError(f"{text!r} is not the origin of a page, such as https://control.example:8443")
+    return text
+
+
 def _split(value: object) -> object:
     return [part.strip() for part in value.split(",") if part.strip()] if isinstance(value, str) else value
 
 
 Endpoints = Annotated[tuple[Annotated[str, AfterValidator(_check_endpoint)], ...], NoDecode, BeforeValidator(_split)]
+Origins = Annotated[tuple[Annotated[str, AfterValidator(_check_origin)], ...], NoDecode, BeforeValidator(_split)]
 Seconds = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False)]
 
 
@@ -119,6 +143,11 @@ class Settings(LiveSettings, BaseSettings):
         default=2, ge=1, le=256, description="How many surveys run at a time; of a cluster, while it is away."
     )
     insecure: bool = Field(default=False, description="Listen beyond loopback without access control.")
+    cors_origins: Origins = Field(
+        default=(), description="Origins whose pages may ask the REST interface in a browser, separated by commas."
+    )
+    tls_cert: Path | None = Field(default=None, description="PEM file with the REST interface's certificate and chain.")
+    tls_key: Path | None = Field(default=None, description="PEM file with the key of tls_cert, without a password.")
     log_level: Literal["debug", "info", "warning", "error"] = Field(default="info", description="Least level to log.")
     log_format: Literal["text", "json"] = Field(default="text", description="A line of words, or a JSON object.")
     log_lines_per_minute: int = Field(
@@ -130,6 +159,14 @@ class Settings(LiveSettings, BaseSettings):
     decay_after_s: Seconds = Field(default=60, description="An overlap decays when it is older than this.")
     unknown_after_s: Seconds = Field(default=600, description="An overlap is unknown when it is older than this.")
     retry_after_s: Seconds = Field(default=30, description="No pair whose views cannot meet is tried again sooner.")
+
+    # Names of live settings, with a dot before parts, that came with flags or from the environment.
+    _pinned: frozenset[str] = PrivateAttr(default=frozenset())
+
+    @property
+    def pinned(self) -> frozenset[str]:
+        """Live settings, or parts such as hysteresis.gain, that flags or the environment say: nothing stored does."""
+        return self._pinned
 
     @property
     def api_address(self) -> Address:
@@ -143,6 +180,7 @@ class Settings(LiveSettings, BaseSettings):
         # What is asked of a database, or configures an end point, may hold a key.
         shown["database"] = make_url(self.database).set(query={}).render_as_string(hide_password=True)
         shown |= {name: ", ".join(each.split("#")[0] for each in getattr(self, name)) for name in ("link", "connect")}
+        shown["cors_origins"] = ", ".join(self.cors_origins)
         return shown
 
     @property
@@ -162,6 +200,9 @@ class Settings(LiveSettings, BaseSettings):
                 f"setting forget_after_s = {self.forget_after_s:g} must not be less than live_after_s + gone_after_s "
                 f"= {self.live_after_s + self.gone_after_s:g}"
             )
+        if (self.tls_cert is None) != (self.tls_key is None):
+            given, absent = ("tls_cert", "tls_key") if self.tls_key is None else ("tls_key", "tls_cert")
+            raise ValueError(f"setting {given} needs {absent}: TLS takes a certificate and its key")
         if not self.link and not self.connect:
             raise ValueError("setting link is empty, and so is connect: no robot could reach the station")
         return self
@@ -188,7 +229,36 @@ def load(flags: Mapping[str, object] | None = None, file: Path | None = None) ->
     except ValidationError as error:
         raise SettingsError(_one_line(error)) from error
     # A class that every process can import, for settings that travel to one.
-    return Settings.model_construct(**dict(layered))
+    settings = Settings.model_construct(**dict(layered))
+    settings._pinned = _names(flags or {}) | _names(EnvSettingsSource(Settings)())
+    return settings
+
+
+def with_stored(settings: Settings, stored: Patch) -> Settings:
+    """The settings with those laid over that were given while the station ran, but for what is pinned.
+
+    What makes no sense any more is left out, with a warning.
+    """
+    live = settings.live
+    for name, value in stored.items():
+        if name in settings.pinned or name.partition(".")[0] in settings.pinned:
+            continue
+        try:
+            live = patched(live, {name: value})
+        except ValidationError:
+            log.warning("a stored setting makes no sense any more and is left out: %s", name)
+    found = settings.model_copy(update={name: getattr(live, name) for name in LiveSettings.model_fields})
+    found._pinned = settings.pinned
+    return found
+
+
+def _names(values: Mapping[str, object]) -> frozenset[str]:
+    """Names of the live settings among them; parts of the hysteresis by themselves."""
+    parts = values.get("hysteresis")
+    whole = {name for name in LiveSettings.model_fields if name in values}
+    if isinstance(parts, Mapping):
+        whole = whole - {"hysteresis"} | {f"hysteresis.{part}" for part in parts}
+    return frozenset(whole)
 
 
 def _read(file: Path) -> dict[str, object]:

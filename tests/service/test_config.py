@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 from covista_schemas.reports import GroupBounds, Hysteresis, LiveSettings
-from covista_service.config import Address, Settings, SettingsError, load, parse_address
+from covista_service.config import Address, Settings, SettingsError, load, parse_address, with_stored
 
 
 @pytest.fixture(autouse=True)
@@ -167,6 +167,31 @@ def test_what_is_wrong_with_a_part_names_the_part(
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    "text", ["https://control.example", "http://localhost:3000", "https://10.0.0.1:8443", "http://[::1]:80"]
+)
+def test_origins_of_pages_are_named_in_full(text: str) -> None:
+    assert load({"cors_origins": f"{text}, https://other.example"}).cors_origins == (text, "https://other.example")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("*", "https://*.example", "control.example", "https://a.example/", "https://a.example/x", "ftp://a.example"),
+        *("https://", "https://u@a.example", "https://a.example:x", "https://A.example", "https://a.example?b", "null"),
+    ],
+)
+def test_what_is_no_origin_is_refused(text: str) -> None:
+    with pytest.raises(SettingsError, match=r"setting cors_origins \(COVISTA_CORS_ORIGINS\): .* is not the origin"):
+        load({"cors_origins": text})
+
+
+@pytest.mark.parametrize(("given", "absent"), [("tls_cert", "tls_key"), ("tls_key", "tls_cert")])
+def test_a_certificate_needs_its_key(given: str, absent: str) -> None:
+    with pytest.raises(SettingsError, match=f"setting {given} needs {absent}"):
+        load({given: "station.pem"})
+
+
 def test_settings_are_shown_without_what_is_secret() -> None:
     settings = load(
         {
@@ -180,3 +205,46 @@ def test_settings_are_shown_without_what_is_secret() -> None:
     assert shown["database"] == "postgresql://station:***@db:5432/covista"
     assert shown["connect"] == "tls/router:7447, tcp/10.0.0.1:7447"
     assert shown["alpha"] == "0.5"
+
+
+def test_what_was_given_while_it_ran_goes_before_the_file_and_after_all_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "station.toml"
+    file.write_text("alpha = 0.1\nmin_group_size = 2\nsigma = 2.5\n[hysteresis]\nsmoothing = 0.9\n")
+    monkeypatch.setenv("COVISTA_SIGMA", "std")
+    monkeypatch.setenv("COVISTA_HYSTERESIS__GAIN", "0.1")
+    settings = load({"criterion": "gain"}, file)
+    assert settings.pinned == {"criterion", "sigma", "hysteresis.gain"}
+    given = {
+        "alpha": 0.7,
+        "sigma": 4.0,
+        "criterion": "paper",
+        "groups": {"min": 1, "max": 3},
+        "hysteresis.gain": 0.3,
+        "hysteresis.persistence_s": 2.0,
+    }
+    live = with_stored(settings, given).live
+    assert (live.alpha, live.min_group_size, live.groups) == (0.7, 2, GroupBounds(min=1, max=3))
+    assert (live.sigma, live.criterion) == ("std", "gain")
+    assert live.hysteresis == Hysteresis(gain=0.1, persistence_s=2.0, smoothing=0.9)
+
+
+def test_what_was_given_and_makes_no_sense_any_more_is_left_out_with_a_warning(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    given = {"alpha": 7, "colour": "red", "hysteresis.colour": 1, "hysteresis.gain": None, "criterion": "gain"}
+    assert with_stored(load(), given).live == LiveSettings(criterion="gain")
+    assert [record.args for record in caplog.records] == [
+        ("alpha",),
+        ("colour",),
+        ("hysteresis.colour",),
+        ("hysteresis.gain",),
+    ]
+
+
+def test_what_is_pinned_travels_between_processes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COVISTA_ALPHA", "0.2")
+    settings = pickle.loads(pickle.dumps(load({"groups": 3})))
+    assert settings.pinned == {"alpha", "groups"}
+    assert with_stored(settings, {"criterion": "gain"}).pinned == {"alpha", "groups"}

@@ -42,8 +42,13 @@ def pair_summaries(
         find_robot(snapshot, robot)
         views = (snapshot.pair(robot, other) for other in snapshot.robots if other != robot)
     for view in views:
-        listed = max(view.overlap_a or 0.0, view.overlap_b or 0.0) >= least
-        yield reports.PairSummary.model_validate(_pair(view, "a")) if listed else None
+        yield pair_summary(view, least)
+
+
+def pair_summary(view: PairView, least: float = 0.0) -> reports.PairSummary | None:
+    """A pair of a snapshot; None if neither sees this share of the other's image."""
+    listed = max(view.overlap_a or 0.0, view.overlap_b or 0.0) >= least
+    return reports.PairSummary.model_validate(_pair(view, "a")) if listed else None
 
 
 def find_pair(snapshot: Snapshot, a: str, b: str) -> PairView:

@@ -16,12 +16,12 @@ from covista_service.station.snapshot import RobotView, Snapshot
 
 def robots_report(snapshot: Snapshot) -> reports.RobotsReport:
     """All robots."""
-    return reports.RobotsReport(robots=[_robot(view) for view in snapshot.robots.values()])
+    return reports.RobotsReport(robots=[robot_view_report(view) for view in snapshot.robots.values()])
 
 
 def robot_report(snapshot: Snapshot, robot: str) -> reports.RobotReport:
     """One robot. Raises NotKnownError."""
-    return _robot(find_robot(snapshot, robot))
+    return robot_view_report(find_robot(snapshot, robot))
 
 
 def find_robot(snapshot: Snapshot, robot: str) -> RobotView:
@@ -32,7 +32,8 @@ def find_robot(snapshot: Snapshot, robot: str) -> RobotView:
     return view
 
 
-def _robot(view: RobotView) -> reports.RobotReport:
+def robot_view_report(view: RobotView) -> reports.RobotReport:
+    """A robot of a snapshot."""
     return reports.RobotReport(
         id=view.id,
         status=view.status,

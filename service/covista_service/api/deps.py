@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -11,8 +12,12 @@ from covista_schemas.keys import ID_PATTERN
 from covista_schemas.reports import Health, Report
 from fastapi import Depends, Path, Request, Response
 
+from covista_service.access import Gate
+from covista_service.answers.past import Archive
 from covista_service.api.delivery import deliver
 from covista_service.api.outgoing import Outgoing
+from covista_service.api.rooms import Room
+from covista_service.api.stream import Stream
 from covista_service.api.vitals import Vitals
 from covista_service.loop import Loop
 from covista_service.station.census import Census
@@ -24,14 +29,26 @@ JSON = "application/json"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Parts:
-    """What the routes need of the station. `name` changes with each start, so that no answer is mistaken for newer."""
+    """What the routes need of the station. `name` changes with each start, so that no answer is mistaken for newer.
+
+    `gate` says who may ask.
+    `flush` waits so many seconds at most until what was told is in the history, and says whether it is.
+    """
 
     loop: Loop
     telemetry: Telemetry
     health: Callable[[], Health]
     vitals: Callable[[], Vitals]
     name: str
+    gate: Gate
+    archive: Archive
+    flush: Callable[[float], bool]
+    stream: Stream
     outgoing: Outgoing = field(default_factory=Outgoing)
+    readers: Room = field(default_factory=lambda: Room(at_once=3, waiting=200))
+    previews: Room = field(default_factory=lambda: Room(at_once=1, waiting=20))
+    # Who changes settings begins with those that the one before has left.
+    setting: asyncio.Lock = field(default_factory=asyncio.Lock)
 
 
 class State(TypedDict):
@@ -62,6 +79,15 @@ async def census_of(parts: PartsNow) -> Census:
 CensusNow = Annotated[Census, Depends(census_of)]
 SnapshotNow = Annotated[Snapshot, Depends(snapshot_of)]
 RobotPath = Annotated[str, Path(pattern=f"^{ID_PATTERN}$", description="Id of a robot.", examples=["r1"])]
+
+
+def asker_of(request: Request) -> str | None:
+    """Name of the token of whoever asks; None where nobody needs one."""
+    by = request.scope.get("covista.by")
+    return by if isinstance(by, str) else None
+
+
+AskerNow = Annotated[str | None, Depends(asker_of)]
 
 
 def answer(report: Report, outgoing: Outgoing | None = None) -> Response:

@@ -2,31 +2,70 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from http import HTTPStatus
 from typing import Any
 
+from covista_schemas.errors import CovistaError
 from covista_schemas.reports import Problem
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 
 from covista_service.answers import NotKnownError, problem_of
+from covista_service.answers.past import CursorError, HistoryUnavailableError
+from covista_service.api.negotiation import NotAcceptableError
+from covista_service.api.rooms import FullError
 
+# What a status means here.
+_MEANINGS: Mapping[int, str] = {
+    400: "The body is no JSON",
+    404: "What the question names is not known",
+    406: "There is nothing that fits Accept",
+    409: "Parts of the question contradict each other",
+    422: "Malformed request",
+    500: "A bug of the station's",
+    503: "Not now: try again after Retry-After seconds",
+}
 PROBLEM_JSON = "application/problem+json"
 
 
-def install(app: FastAPI) -> None:
-    """Have every error of the app answered with a problem."""
+class ContradictionError(CovistaError):
+    """A question whose parts are well formed and contradict each other."""
+
+
+# What each error comes to, and when to try again.
+_KINDS: Mapping[type[Exception], tuple[int, str, int | None]] = {
+    CursorError: (422, "Malformed request", None),
+    ContradictionError: (409, "Contradiction", None),
+    NotAcceptableError: (406, "Not Acceptable", None),
+    FullError: (503, "Too many ask", 1),
+    HistoryUnavailableError: (503, "The history cannot be read", 5),
+    TimeoutError: (503, "The station is too busy", 5),
+}
+
+
+def install(app: FastAPI, methods_of: Callable[[str], Sequence[str]]) -> None:
+    """Have every error of the app answered with a problem; `methods_of` tells what may be done with a path."""
+
+    def refused(request: Request, error: Exception) -> Response:
+        response = _refused(request, error)
+        if response.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
+            # That of the first route alone is what the framework knows.
+            response.headers["allow"] = ", ".join(methods_of(request.url.path))
+        return response
+
     app.add_exception_handler(NotKnownError, _not_known)
+    for kind in _KINDS:
+        app.add_exception_handler(kind, _gone_wrong)
     app.add_exception_handler(RequestValidationError, _not_valid)
-    app.add_exception_handler(HTTPException, _refused)
+    app.add_exception_handler(HTTPException, refused)
     app.add_exception_handler(Exception, _broken)
 
 
 def describe(*statuses: int) -> dict[int | str, dict[str, Any]]:
     """The answers with these statuses, for a route's description."""
-    return {status: {"model": Problem, "description": HTTPStatus(status).phrase} for status in statuses}
+    return {status: {"model": Problem, "description": _MEANINGS[status]} for status in statuses}
 
 
 def refuse(problem: Problem, headers: Mapping[str, str] | None = None) -> Response:
@@ -43,6 +82,13 @@ def _not_known(request: Request, error: Exception) -> Response:
     if not isinstance(error, NotKnownError):
         raise error
     return refuse(problem_of(error, request.url.path))
+
+
+def _gone_wrong(request: Request, error: Exception) -> Response:
+    status, title, again_s = next(_KINDS[kind] for kind in type(error).__mro__ if kind in _KINDS)
+    headers = None if again_s is None else {"retry-after": f"{again_s}"}
+    detail = str(error) or None
+    return refuse(Problem(title=title, status=status, detail=detail, instance=request.url.path), headers)
 
 
 def _not_valid(request: Request, error: Exception) -> Response:

@@ -5,19 +5,26 @@ FastAPI leaves null fields out of examples, so they have none that is required.
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from covista_schemas.messages import Camera
 from covista_schemas.reports import (
     Counters,
+    EventKind,
+    EventReport,
+    EventsHistory,
     FoundBy,
+    Gap,
     Group,
+    GroupsHistory,
     GroupsReport,
     Health,
     KeyframeId,
     LiveSettings,
+    PairHistory,
     PairKeyframes,
+    PairMoment,
     PairReport,
     PairsReport,
     PairSummary,
@@ -28,11 +35,14 @@ from covista_schemas.reports import (
     Report,
     RobotReport,
     RobotsReport,
+    RobotTrack,
     Score,
     SimilarityReport,
     Status,
+    TrackPoint,
     Ungrouped,
 )
+from fastapi.openapi.models import Example
 
 _TIME = datetime(2026, 5, 4, 12, 30, 15, tzinfo=UTC)
 _KEYFRAME = KeyframeId(boot="b7f3", sequence=41)
@@ -96,6 +106,41 @@ GROUPS = GroupsReport(
     scores=[Score(groups=1, score=0.83)],
     settings=LiveSettings(),
 )
+EVENT = EventReport(
+    id=118,
+    event=EventKind.JOIN,
+    time=_TIME,
+    robots=["r2"],
+    labels=["g1"],
+    revision_before=6,
+    revision_after=7,
+    text="r2 joined g1",
+)
+_GAP = Gap(since=_TIME, until=_TIME + timedelta(seconds=30), lost=12, reason="the database could not be used")
+_CURSOR = "MTE4"
+EVENTS_HISTORY = EventsHistory(items=[EVENT], next=_CURSOR, gaps=[_GAP])
+GROUPS_HISTORY = GroupsHistory(items=[GROUPS], next=_CURSOR)
+PAIR_HISTORY = PairHistory(
+    a="r1",
+    b="r2",
+    items=[PairMoment(time=_TIME, overlap_a=0.51, overlap_b=0.89, found_by=FoundBy.IMAGE)],
+    next=_CURSOR,
+)
+TRACK = RobotTrack(
+    robot="r1",
+    items=[TrackPoint(position_m=(1.2, -0.4, 0.6), orientation_xyzw=(-0.5, 0.5, -0.5, 0.5), time=_TIME)],
+    next=_CURSOR,
+)
+SETTINGS = LiveSettings()
+PATCHES: dict[str, Example] = {
+    "one": {"summary": "One setting", "value": {"alpha": 0.7}},
+    "part": {"summary": "A part of the hysteresis", "value": {"hysteresis": {"persistence_s": 2.0}}},
+    "bounds": {
+        "summary": "Two to four groups, by the gain",
+        "value": {"groups": {"min": 2, "max": 4}, "criterion": "gain"},
+    },
+}
+STREAM = f"id: {EVENT.id}\nevent: {EVENT.event}\ndata: {EVENT.model_dump_json()}\n\n: alive\n\n"
 HEALTH = Health(status="ready", parts={"link": PartHealth(status="ready", detail="tcp/127.0.0.1:7447")})
 UNCHANGED: dict[int | str, dict[str, Any]] = {304: {"description": "Not changed since If-None-Match's version"}}
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 MAX_BYTES = 256 * 1024 * 1024
 # Given to the connection at a time; more of it waits here, shared, and not in each connection's buffer.
 CHUNK_BYTES = 128 * 1024
+Piece = bytes | memoryview
 # Answers kept for who asks next.
 _KINDS = 2
 
@@ -31,10 +32,10 @@ class Body:
         object.__setattr__(self, "size", sum(map(len, self.chunks)))
 
 
-def body_of(pieces: Iterable[bytes], tag: str = "") -> Body:
+def body_of(pieces: Iterable[Piece], tag: str = "") -> Body:
     """A body of these pieces, put together and cut so that each is some `CHUNK_BYTES` long."""
     chunks: list[bytes] = []
-    waiting: list[bytes] = []
+    waiting: list[Piece] = []
     size = 0
     for piece in pieces:
         for at in range(0, len(piece), CHUNK_BYTES):
@@ -88,7 +89,7 @@ class Outgoing:
         async with self._sending:
             await asyncio.sleep(0)
 
-    async def share(self, kind: str, tag: Callable[[], str], make: Callable[[], Callable[[], Iterable[bytes]]]) -> Body:
+    async def share(self, kind: str, tag: Callable[[], str], make: Callable[[], Callable[[], Iterable[Piece]]]) -> Body:
         """The answer of a kind with the `tag` of now, made in another thread unless it is there, one at a time.
 
         `make` is called here and gives what makes it there. Who waits while another is made gets the next, or that one

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib.metadata import version
 
 from fastapi import APIRouter, FastAPI
+from starlette.middleware.cors import CORSMiddleware
 from starlette.types import ASGIApp, Lifespan, Receive, Scope, Send
 
-from covista_service.api import contract, errors, groups, health, pairs, robots, similarity
+from covista_service.api import contract, errors, events, groups, health, pairs, robots, settings, similarity
+from covista_service.api.bodies import bounded
+from covista_service.api.guard import guarded
+from covista_service.api.listening import HEAD_ONLY
 from covista_service.api.timing import PREFIX, timed
 
+_METHODS = ("GET", "HEAD", "POST", "PATCH", "DELETE")
+_ASKED_WITH = ("authorization", "content-type", "if-none-match", "last-event-id")
+_TOLD = ("etag", "link", "retry-after", "www-authenticate")
 
-def build(lifespan: Lifespan[FastAPI] | None = None) -> FastAPI:
-    """The application; its state, `deps.State`, is what `lifespan` yields."""
+
+def build(lifespan: Lifespan[FastAPI] | None = None, cors_origins: Sequence[str] = ()) -> FastAPI:
+    """The application; its state, `deps.State`, is what `lifespan` yields. Pages of `cors_origins` may ask it."""
     app = FastAPI(
         title="Covista",
         version=version("covista"),
@@ -21,11 +30,23 @@ def build(lifespan: Lifespan[FastAPI] | None = None) -> FastAPI:
         redoc_url=None,
     )
     nouns = APIRouter(prefix=PREFIX, responses=errors.describe(422, 500))
-    for router in (robots.router, pairs.router, similarity.router, groups.router):
-        nouns.include_router(router)
+    for noun in (robots, pairs, similarity, groups, events, settings):
+        nouns.include_router(noun.router)
     app.include_router(nouns)
     app.include_router(health.router)
-    errors.install(app)
+    errors.install(app, lambda path: contract.methods_of(app.openapi(), path))
+    # The last one added is the first to hear of a request.
+    app.add_middleware(bounded)
+    app.add_middleware(guarded)
+    if cors_origins:
+        # Outside of the guard: browsers ask first, without a token, and pages are to read why they stay out.
+        app.add_middleware(
+            CORSMiddleware,
+            allow_origins=list(cors_origins),
+            allow_methods=_METHODS,
+            allow_headers=_ASKED_WITH,
+            expose_headers=_TOLD,
+        )
     app.add_middleware(timed)
     app.add_middleware(_head_as_get)
     # FastAPI's way to replace its own description is to assign the method.
@@ -38,6 +59,6 @@ def _head_as_get(app: ASGIApp) -> ASGIApp:
 
     async def answer(scope: Scope, receive: Receive, send: Send) -> None:
         asked_for_head = scope["type"] == "http" and scope["method"] == "HEAD"
-        await app({**scope, "method": "GET"} if asked_for_head else scope, receive, send)
+        await app({**scope, "method": "GET", HEAD_ONLY: True} if asked_for_head else scope, receive, send)
 
     return answer

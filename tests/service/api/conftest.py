@@ -1,19 +1,25 @@
 import asyncio
+import json
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import httpx
 import pytest
 from covista_schemas.reports import Health, PartHealth
+from covista_service.access import Gate, Keyring
+from covista_service.access import Scope as AccessScope
 from covista_service.api import rest
 from covista_service.api.deps import Parts
+from covista_service.api.stream import Stream
 from covista_service.api.vitals import Vitals
 from covista_service.link.mailbox import Depths
 from covista_service.loop import CrewStatus, Loop, SinkStatus
 from covista_service.station.events import Event
+from covista_service.store.archive import Archive
 from covista_service.telemetry import Telemetry
 
+from tests.service.access.sources import Shelf
 from tests.service.hands import Hands
 from tests.service.station.scenes import Scene
 
@@ -26,6 +32,13 @@ class Silence:
 
     def drain(self, limit: int, now_ns: int) -> tuple[Iterable[Event], int | None]:
         return (), None
+
+
+def open_gate(*, any_host: bool) -> Gate:
+    """A gate of a station without tokens."""
+    keyring = Keyring()
+    keyring.take([])
+    return Gate(keyring, any_host=any_host)
 
 
 @dataclass
@@ -46,25 +59,64 @@ class Desk:
     )
     health: Health = field(default_factory=lambda: Health(status="ready", parts={"link": PartHealth(status="ready")}))
 
+    gate: Gate = field(default_factory=lambda: open_gate(any_host=True))
+    # Name of the token that is asked with.
+    by: str | None = None
+    # Nobody keeps a history there.
+    database: str = "sqlite:////nowhere/covista.db"
+
     def __post_init__(self) -> None:
         self.app = rest.build()
         telemetry = Telemetry()
         loop = Loop(self.scene.station, Silence(), Hands(), [], telemetry, clock=lambda: self.scene.now_ns)
-        self.parts = Parts(loop, telemetry, lambda: self.health, lambda: self.vitals, "test")
+        self.archive = Archive(self.database)
+        self.parts = Parts(
+            loop,
+            telemetry,
+            lambda: self.health,
+            lambda: self.vitals,
+            "test",
+            self.gate,
+            archive=self.archive,
+            flush=lambda _: True,
+            stream=Stream(),
+        )
 
     async def _stateful(self, scope: dict[str, Any], receive: Any, send: Any) -> None:
-        scope["state"] = {"parts": self.parts}
+        parts = self.parts
+        if self.by is not None:
+            shelf, keyring = Shelf(), Keyring()
+            token = shelf.add(self.by, AccessScope.OPERATE)
+            keyring.take(shelf.read())
+            parts = replace(parts, gate=Gate(keyring))
+            scope["headers"] = [*scope["headers"], (b"authorization", f"Bearer {token}".encode())]
+        scope["state"] = {"parts": parts}
         await self.app(scope, receive, send)
 
-    def ask(self, path: str, method: str = "GET", **headers: str) -> httpx.Response:
-        """One request."""
+    def ask(self, path: str, method: str = "GET", content: str | None = None, **headers: str) -> httpx.Response:
+        """One request, while the station turns."""
 
         async def asking() -> httpx.Response:
             transport = httpx.ASGITransport(self._stateful, raise_app_exceptions=False)
             async with httpx.AsyncClient(transport=transport, base_url="http://station") as client:
-                return await client.request(method, path, headers=headers)
+                turning = asyncio.create_task(self._turn())
+                try:
+                    return await client.request(method, path, headers=headers, content=content)
+                finally:
+                    turning.cancel()
 
         return asyncio.run(asking())
+
+    async def _turn(self) -> None:
+        while True:
+            if self.parts.loop._done:
+                self.parts.loop.turn()
+            await asyncio.sleep(0)
+
+    def send(self, method: str, path: str, body: object, **headers: str) -> httpx.Response:
+        """One request with a body."""
+        headers = {"content-type": "application/json"} | headers
+        return self.ask(f"/api/v1{path}", method, body if isinstance(body, str) else json.dumps(body), **headers)
 
     def get(self, path: str, **headers: str) -> httpx.Response:
         """One question to the API."""

@@ -95,9 +95,15 @@ def test_what_is_malformed_is_named(desk: Desk) -> None:
 
 
 def test_methods_that_are_not_there_are_a_problem_that_names_those_that_are(desk: Desk) -> None:
-    response = desk.ask("/api/v1/robots", "DELETE")
-    assert (response.status_code, response.headers["content-type"]) == (405, "application/problem+json")
-    assert response.headers["allow"] == "GET"
+    for path, allowed in (
+        ("/robots", "GET, HEAD"),
+        ("/robots/r1", "DELETE, GET, HEAD"),
+        ("/settings", "GET, HEAD, PATCH"),
+        ("/pairs/r1/r2/overlay.png", "GET, HEAD"),
+    ):
+        response = desk.ask(f"/api/v1{path}", "PUT")
+        assert (response.status_code, response.headers["content-type"]) == (405, "application/problem+json")
+        assert response.headers["allow"] == allowed
 
 
 def test_a_bug_of_ours_is_a_problem_without_details(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
