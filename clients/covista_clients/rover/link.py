@@ -42,6 +42,18 @@ def open_with_retry(endpoint: str, stop: threading.Event) -> zenoh.Session | Non
     return None
 
 
+def follow(session: zenoh.Session, key: str, handler: Any) -> zenoh.ext.AdvancedSubscriber[Any]:
+    """Hear what the station tells on `key`: the last value at once, and what was missed as soon as that is noticed."""
+    return zenoh.ext.declare_advanced_subscriber(
+        session,
+        key,
+        handler,
+        # Late publishers too: a station that starts after the rover says where the rover stands.
+        history=zenoh.ext.HistoryConfig(detect_late_publishers=True),
+        recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
+    )
+
+
 class RoverLink:
     """What one robot declares on a session; with `owned`, closing closes the session too."""
 
@@ -105,13 +117,8 @@ class RoverLink:
 
     def follow_group(self, callback: OnGroup) -> None:
         """Call `callback` with the robot's group, the present one first, from a thread of its own."""
-        # Late publishers too: a station that starts after the rover says where the rover stands.
-        subscriber = zenoh.ext.declare_advanced_subscriber(
-            self._session,
-            keys.own_group(self._site, self._robot),
-            zenoh.handlers.RingChannel(_GROUPS_WAITING),
-            history=zenoh.ext.HistoryConfig(detect_late_publishers=True),
-        )
+        key = keys.own_group(self._site, self._robot)
+        subscriber = follow(self._session, key, zenoh.handlers.RingChannel(_GROUPS_WAITING))
         # No callback of zenoh's: its thread cannot be joined, and one that outlives the interpreter aborts the program.
         name = f"rover-{self._robot}-groups"
         follower = threading.Thread(target=self._follow, args=(subscriber, callback), name=name, daemon=True)
