@@ -143,7 +143,7 @@ class MissionControl:
         """The robots, and one matrix (N, N) in their order; NaN is unknown. Far faster than a report of many."""
         headers = {"Accept": "application/x-npy"}
         response = self._connection.get(f"{_V1}/similarity", {"matrix": matrix}, headers=headers)
-        return read_matrix(response, lambda: self.similarity().robots)
+        return read_matrix(response)
 
     def groups(self) -> GroupsReport:
         """The grouping in force; not sent again while it stands."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import random
 import socket
@@ -13,7 +14,7 @@ from typing import Self
 
 import httpx
 from covista_schemas.errors import ApiError
-from covista_schemas.reports import EventKind, EventReport, Problem
+from covista_schemas.reports import EventKind, EventReport
 from httpx_sse import EventSource, ServerSentEvent, SSEError
 from pydantic import ValidationError
 
@@ -73,10 +74,9 @@ class Events(Iterator[EventReport]):
         failures = 0
         while not self._closed.is_set():
             began_s, before = time.monotonic(), self.last_event_id
-            problem: Exception | str
+            problem: Exception | None = None
             try:
                 yield from self._listen()
-                problem = "the station ended the stream"
             except (httpx.HTTPError, ApiError) as error:
                 if self._closed.is_set():
                     return
@@ -116,7 +116,7 @@ class Events(Iterator[EventReport]):
         if sse.event == "reset":
             logger.warning("events are missing: %s", _words(sse.data))
         elif sse.event == "cut":
-            logger.warning("the station cuts the stream of events off: %s", _words(sse.data))
+            logger.info("the station ends the stream of events: %s", _words(sse.data))
             return None
         if sse.id:
             self.last_event_id = sse.id
@@ -139,14 +139,16 @@ class Events(Iterator[EventReport]):
         if not self._connected and (failures + 1 >= ATTEMPTS or isinstance(error, httpx.UnsupportedProtocol)):
             raise self._connection.no_answer(error) from error
 
-    def _rest(self, failures: int, problem: Exception | str) -> None:
+    def _rest(self, failures: int, problem: Exception | None) -> None:
+        """Wait before the next connection; a stream that was ended in order is no trouble."""
         if self._closed.is_set():
             return
         pause_s = min(MOST_PAUSE_S, self._base_pause_s * 2 ** min(failures, 10)) * random.uniform(0.5, 1.0)
         if isinstance(problem, ApiError) and problem.retry_after_s is not None:
             pause_s = max(pause_s, min(problem.retry_after_s, _MOST_RETRY_AFTER_S))
-        level = logging.WARNING if self._connected and failures <= 1 else logging.DEBUG
-        logger.log(level, "events: %s; connecting again in %.1f s", problem or type(problem).__name__, pause_s)
+        level = logging.WARNING if problem is not None and failures <= 1 else logging.DEBUG
+        reason = "the stream ended" if problem is None else str(problem) or type(problem).__name__
+        logger.log(level, "events: %s; connecting again in %.1f s", reason, pause_s)
         self._closed.wait(pause_s)
 
 
@@ -167,8 +169,17 @@ def _not_a_station(response: httpx.Response, detail: str) -> ApiError:
 
 
 def _words(data: str) -> str:
+    """What `cut` and `reset` say, for people."""
     try:
-        problem = Problem.read(data)
-    except ValidationError:
-        return data[:300]
-    return f"{problem.title}: {problem.detail}" if problem.detail else problem.title
+        said = json.loads(data)
+    except ValueError:
+        said = None
+    match said:
+        case {"title": str(title), "detail": str(detail)}:
+            return f"{title}: {detail}"
+        case {"title": str(title)}:
+            return title
+        case {"first": int(first), "last": int(last), "reason": str(reason)}:
+            return f"{first} to {last}: {reason}"
+        case _:
+            return data[:300]

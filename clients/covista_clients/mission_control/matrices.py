@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
 from typing import Literal
 
 import httpx
@@ -14,17 +13,17 @@ from numpy.typing import NDArray
 MatrixName = Literal["similarity", "overlap", "closeness", "distance_m"]
 
 
-def read_matrix(response: httpx.Response, robots: Callable[[], list[str]]) -> tuple[list[str], NDArray[np.float64]]:
-    """The robots and their matrix (N, N) in .npy. Raises ApiError for what is not that."""
+def read_matrix(response: httpx.Response) -> tuple[list[str], NDArray[np.float64]]:
+    """The robots and their matrix (N, N), from two arrays in .npy: the matrix, and ids as bytes. Raises ApiError."""
+    file = io.BytesIO(response.content)
     try:
-        matrix = np.load(io.BytesIO(response.content), allow_pickle=False)
+        matrix, ids = (np.load(file, allow_pickle=False) for _ in range(2))
     except (ValueError, EOFError, OSError) as error:
         raise _odd(response, str(error)) from error
-    named = response.headers.get("Covista-Robots")
-    order = robots() if named is None else [name.strip() for name in named.split(",") if name.strip()]
-    if not isinstance(matrix, np.ndarray) or matrix.dtype.kind != "f" or matrix.shape != (len(order), len(order)):
-        raise _odd(response, f"an array {getattr(matrix, 'shape', '')} for {len(order)} robots")
-    return order, np.asarray(matrix, np.float64)
+    told = (matrix.dtype.kind, ids.dtype.kind, matrix.shape)
+    if told != ("f", "S", (ids.size, ids.size)) or ids.ndim != 1:
+        raise _odd(response, f"{matrix.dtype} {matrix.shape} for ids {ids.dtype} {ids.shape}")
+    return [robot.decode("ascii", "replace") for robot in ids.tolist()], np.asarray(matrix, np.float64)
 
 
 def _odd(response: httpx.Response, detail: str) -> ApiError:

@@ -6,39 +6,51 @@ import pytest
 from covista_clients import MissionControl
 from covista_schemas.errors import ApiError
 
-from tests.clients import sample
 
-
-def npy(array: np.ndarray) -> bytes:
+def npy(*arrays: np.ndarray) -> bytes:
     file = io.BytesIO()
-    np.save(file, array)
+    for array in arrays:
+        np.save(file, array)
     return file.getvalue()
 
 
-def control(content: bytes, headers: dict[str, str]) -> MissionControl:
+MATRIX, IDS = np.array([[1, 0.5], [np.nan, 1]]), np.array([b"r1", b"robot-2"])
+
+
+def control(content: bytes) -> MissionControl:
     def answer(request: httpx.Request) -> httpx.Response:
-        if request.headers["Accept"] != "application/x-npy":
-            return httpx.Response(200, content=sample.SIMILARITY.model_dump_json())
+        assert request.headers["Accept"] == "application/x-npy"
         assert dict(request.url.params) == {"matrix": "overlap"}
-        return httpx.Response(200, content=content, headers=headers)
+        return httpx.Response(200, content=content)
 
     return MissionControl(transport=httpx.MockTransport(answer))
 
 
-MATRIX = np.array([[1, 0.5], [np.nan, 1]])
-
-
-@pytest.mark.parametrize("headers", [{"Covista-Robots": "r1,r2"}, {}])
-def test_robots_and_matrix_in_one_order(headers: dict[str, str]) -> None:
-    with control(npy(MATRIX), headers) as asking:
-        robots, matrix = asking.similarity_matrix("overlap")
-    assert robots == ["r1", "r2"]
-    np.testing.assert_array_equal(matrix, MATRIX)
+@pytest.mark.parametrize(
+    ("matrix", "ids", "robots"),
+    [(MATRIX, IDS, ["r1", "robot-2"]), (np.eye(1), np.array([b"r1"]), ["r1"]), (np.zeros((0, 0)), IDS[:0], [])],
+)
+def test_robots_and_matrix_in_one_order(matrix: np.ndarray, ids: np.ndarray, robots: list[str]) -> None:
+    with control(npy(matrix, ids)) as asking:
+        told, read = asking.similarity_matrix("overlap")
+    assert told == robots
+    np.testing.assert_array_equal(read, matrix)
 
 
 @pytest.mark.parametrize(
-    "content", [b"", b"not an array", npy(MATRIX)[:-4], npy(np.eye(3)), npy(np.array([[{}]])), npy(np.array([["a"]]))]
+    "content",
+    [
+        b"",
+        b"not an array",
+        npy(MATRIX),
+        npy(MATRIX, IDS)[:-4],
+        npy(np.eye(3), IDS),
+        npy(MATRIX, MATRIX),
+        npy(MATRIX, IDS[:, None]),
+        npy(np.array([[{}]]), IDS),
+        npy(IDS, IDS),
+    ],
 )
 def test_what_is_no_matrix_is_an_api_error(content: bytes) -> None:
-    with control(content, {"Covista-Robots": "r1,r2"}) as asking, pytest.raises(ApiError, match="as a station does"):
+    with control(content) as asking, pytest.raises(ApiError, match="as a station does"):
         asking.similarity_matrix("overlap")
