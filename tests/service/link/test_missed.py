@@ -12,7 +12,7 @@ from covista_clients.rover.link import follow
 from covista_schemas import keys
 from covista_schemas.reports import EventKind, EventReport, OwnGroupReport, time_of
 from covista_schemas.zenoh_config import config
-from covista_service.link.publish import Publisher
+from covista_service.link.publish import EVENTS_KEPT, Publisher
 from covista_service.link.session import open_session
 from covista_service.loop import News
 from covista_service.station.snapshot import GroupView, Snapshot
@@ -103,3 +103,23 @@ def test_events_told_while_the_router_was_away_arrive_in_order_and_all() -> None
             subscriber.undeclare()
         publisher.close()
     assert numbers == list(range(1, 101))
+
+
+def test_who_comes_late_hears_the_last_some_hundred_events_in_order(air: Air) -> None:
+    publisher = Publisher(air.station, "late")
+    numbers: list[int] = []
+    try:
+        publisher.take(News(Scene().snapshot, events(1, EVENTS_KEPT + 100), False, ()))
+        wait_until(lambda: publisher.status().waiting == 0)
+        subscriber = follow(
+            air.rover,
+            keys.events("late"),
+            lambda sample: numbers.append(EventReport.read(sample.payload.to_bytes()).id),
+        )
+        wait_until(lambda: len(numbers) >= EVENTS_KEPT)
+        publisher.take(News(Scene().snapshot, events(EVENTS_KEPT + 101, EVENTS_KEPT + 101), False, ()))
+        wait_until(lambda: len(numbers) > EVENTS_KEPT)
+        subscriber.undeclare()
+    finally:
+        publisher.close()
+    assert numbers == list(range(101, EVENTS_KEPT + 102))
