@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ssl
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 
 from covista_schemas.reports import EventReport, Problem
 
@@ -90,9 +92,13 @@ class EventServer(ThreadingHTTPServer):
 
 
 @contextmanager
-def telling(*script: Tell) -> Iterator[EventServer]:
-    """A server in threads of its own."""
+def telling(*script: Tell, certificate: tuple[Path, Path] | None = None) -> Iterator[EventServer]:
+    """A server in threads of its own, under TLS with a certificate and its key."""
     with EventServer(script) as server:
+        if certificate is not None:
+            context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+            context.load_cert_chain(*certificate)
+            server.socket = context.wrap_socket(server.socket, server_side=True)
         thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
         thread.start()
         try:

@@ -41,6 +41,8 @@ from covista_clients.mission_control.matrices import MatrixName, read_matrix
 
 _R = TypeVar("_R", bound=Report)
 _V1 = "/api/v1"
+# Settings by name, or a model of them of which what was set counts.
+Changes = Mapping[str, object] | Report | None
 
 
 class Page(Protocol):
@@ -168,7 +170,7 @@ class MissionControl:
         """Revisions of the groups, a page at a time."""
         return self._ask(GroupsHistory, "/groups/history", _span(since, until, limit, cursor))
 
-    def preview(self, changes: Mapping[str, object] | None = None, /, **more: object) -> GroupsReport:
+    def preview(self, changes: Changes = None, /, **more: object) -> GroupsReport:
         """The groups that there would be with other settings, such as `alpha=0.7`; changes nothing."""
         response = self._connection.compute(f"{_V1}/groups/preview", _body(changes, more))
         return _read(GroupsReport, response)
@@ -177,7 +179,7 @@ class MissionControl:
         """The settings in force of those that can change while the station runs."""
         return self._ask(LiveSettings, "/settings")
 
-    def patch_settings(self, changes: Mapping[str, object] | None = None, /, **more: object) -> LiveSettings:
+    def patch_settings(self, changes: Changes = None, /, **more: object) -> LiveSettings:
         """Change settings, such as `alpha=0.7, hysteresis={"gain": 0.1}`; the others stay. Returns those in force."""
         return _read(LiveSettings, self._connection.change("PATCH", f"{_V1}/settings", _body(changes, more)))
 
@@ -280,8 +282,9 @@ def _moment(time: datetime) -> str:
     return (time.astimezone(UTC) if time.tzinfo else time.replace(tzinfo=UTC)).isoformat()
 
 
-def _body(changes: Mapping[str, object] | None, more: Mapping[str, object]) -> Any:
-    return to_jsonable_python({**(changes or {}), **more})
+def _body(changes: Changes, more: Mapping[str, object]) -> Any:
+    given = changes.model_dump(exclude_unset=True) if isinstance(changes, Report) else changes or {}
+    return to_jsonable_python({**given, **more})
 
 
 def _read(report: type[_R], response: httpx.Response) -> _R:

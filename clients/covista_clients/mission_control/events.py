@@ -82,6 +82,11 @@ class Events(Iterator[EventReport]):
                     return
                 self._judge(error, failures)
                 problem = error
+            except RuntimeError:
+                # The client was closed under it.
+                if self._closed.is_set():
+                    return
+                raise
             moved = self.last_event_id != before or time.monotonic() - began_s > MOST_PAUSE_S
             failures = 0 if moved else failures + 1
             self._rest(failures, problem)

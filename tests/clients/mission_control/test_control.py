@@ -6,7 +6,7 @@ import httpx
 import pytest
 from covista_clients import MissionControl
 from covista_schemas.errors import ApiError
-from covista_schemas.reports import EventKind, GroupBounds, Problem
+from covista_schemas.reports import EventKind, GroupBounds, Hysteresis, LiveSettings, Problem
 
 from tests.clients import sample
 
@@ -72,11 +72,13 @@ def test_every_question_has_a_typed_answer(control: MissionControl) -> None:
 def test_changes_go_as_json_as_they_were_given(control: MissionControl, station: Station) -> None:
     control.patch_settings({"groups": GroupBounds(min=2, max=3)}, hysteresis={"gain": 0.1})
     control.preview(alpha=0.7)
+    control.preview(LiveSettings(alpha=0.2, hysteresis=Hysteresis(gain=0.3)), criterion="gain")
     control.forget("r1")
     said = [(request.method, request.url.path, request.content) for request in station.requests]
     assert [(method, path, json.loads(content or "null")) for method, path, content in said] == [
         ("PATCH", "/api/v1/settings", {"groups": {"min": 2, "max": 3}, "hysteresis": {"gain": 0.1}}),
         ("POST", "/api/v1/groups/preview", {"alpha": 0.7}),
+        ("POST", "/api/v1/groups/preview", {"alpha": 0.2, "hysteresis": {"gain": 0.3}, "criterion": "gain"}),
         ("DELETE", "/api/v1/robots/r1", None),
     ]
 

@@ -2,6 +2,7 @@ import logging
 import threading
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from covista_clients import MissionControl
@@ -135,9 +136,17 @@ def test_heartbeats_are_signs_of_life(monkeypatch: pytest.MonkeyPatch) -> None:
         assert server.asked == [None]
 
 
+@pytest.mark.parametrize("secured", [False, True])
 @pytest.mark.parametrize("closes", ["events", "control"])
-def test_closing_ends_whoever_waits(closes: str) -> None:
-    with telling(say(*wire(1), stay=True)) as server, MissionControl(server.url) as control:
+def test_closing_ends_whoever_waits(closes: str, secured: bool, certificate: tuple[Path, Path]) -> None:
+    with telling(say(*wire(1), stay=True), certificate=certificate if secured else None) as server:
+        url = server.url.replace("http:", "https:") if secured else server.url
+        end_of_waiting(MissionControl(url, verify=certificate[0]), closes)
+        assert len(server.asked) == 1
+
+
+def end_of_waiting(control: MissionControl, closes: str) -> None:
+    with control:
         events = control.events()
         heard: list[int] = []
         waiting = threading.Event()
@@ -156,7 +165,6 @@ def test_closing_ends_whoever_waits(closes: str) -> None:
         assert time.monotonic() - began_s < 1
         assert heard == [1]
         assert list(events) == []
-        assert len(server.asked) == 1
 
 
 def test_closing_ends_the_wait_for_a_station_that_is_away() -> None:
