@@ -12,7 +12,7 @@ import pytest
 
 from tests import wheel as wheel_of
 
-ROVER_NEEDS = {"eclipse-zenoh", "httpx", "numpy", "protobuf", "pydantic", "rich", "typer"}
+ROVER_NEEDS = {"eclipse-zenoh", "httpx", "httpx-sse", "numpy", "protobuf", "pydantic", "rich", "typer"}
 
 
 @pytest.fixture(scope="module")

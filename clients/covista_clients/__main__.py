@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import typer
 from covista_schemas.errors import CovistaError
 
-from covista_clients.commands import asking, sending, simulating, watching
+from covista_clients.commands import asking, recalling, sending, simulating, tuning, watching
 
 app = typer.Typer(
     name="covista",
@@ -22,12 +22,17 @@ for command in (
     asking.pairs,
     asking.similarity,
     asking.groups,
+    asking.forget,
+    recalling.events,
+    tuning.preview,
     watching.watch,
     sending.send,
     simulating.swarm,
     simulating.render,
 ):
     app.command()(command)
+app.add_typer(recalling.history, name="history")
+app.add_typer(tuning.settings, name="settings")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

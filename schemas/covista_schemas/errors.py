@@ -6,6 +6,9 @@ CovistaError
 ├── MissingExtraError       a command or a call needs an optional package that is not installed
 ├── LinkError               the zenoh network could not be reached or used
 └── ApiError                the station's REST interface answered with a problem, or not at all
+    ├── UnauthorizedError   it wants a token, and there was none or one that it does not know
+    ├── ForbiddenError      the token's scopes do not reach so far
+    └── TooManyError        it has had too many questions (or wrong tokens) from here, for now
 """
 
 from __future__ import annotations
@@ -52,11 +55,26 @@ class LinkError(CovistaError, ConnectionError):
 class ApiError(CovistaError):
     """The station's REST interface answered with a problem, or could not be reached.
 
-    `status` is the HTTP status, or None where there was no answer.
+    `status` is the HTTP status, or None where there was no answer; `retry_after_s` says when to try again, where the
+    station said so.
     """
+
+    retry_after_s: float | None = None
 
     def __init__(self, title: str, *, status: int | None = None, detail: str | None = None) -> None:
         super().__init__(title if not detail else f"{title}: {detail}")
         self.title = title
         self.status = status
         self.detail = detail
+
+
+class UnauthorizedError(ApiError):
+    """The station wants a token: there was none, or one that it does not know (any more)."""
+
+
+class ForbiddenError(ApiError):
+    """The station knows the token, and its scopes do not reach so far."""
+
+
+class TooManyError(ApiError):
+    """Too much was asked from here, or with wrong tokens, for now."""

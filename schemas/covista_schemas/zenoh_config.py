@@ -14,7 +14,10 @@ import zenoh
 
 from covista_schemas.errors import LinkError
 
+# What is larger is dropped without a word by whoever receives it, and the link is kept.
 MAX_MESSAGE_BYTES = 4 * 1024 * 1024
+# The most that an answer may have: what zenoh adds to it counts too.
+MAX_REPLY_BYTES = MAX_MESSAGE_BYTES - 16 * 1024
 # A dead link is noticed after some 1.6 s, not 10 s.
 LEASE_MS = 2000
 # How often a router that does not answer is tried: soon at first, once a second in the end.

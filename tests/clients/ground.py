@@ -36,7 +36,14 @@ def report_on(robot: str, **known: object) -> RobotReport:
 class Ground:
     """Hears everything that robots say, and confirms keyframes unless told otherwise."""
 
-    def __init__(self, endpoint: str, *, answer: Callable[[str], RobotReport | None] | None = None) -> None:
+    def __init__(
+        self,
+        endpoint: str,
+        *,
+        answer: Callable[[str], RobotReport | None] | None = None,
+        router: bool = True,
+    ) -> None:
+        """Without `router`, it is a client of the router at the end point."""
         self.keyframes: list[Keyframe] = []
         self.poses: list[PoseUpdate] = []
         self.samples: list[zenoh.Sample] = []
@@ -44,7 +51,9 @@ class Ground:
         self.asked = 0
         self._answer = answer or self.confirming
         self._news = threading.Condition()
-        self.session = zenoh.open(config("router", listen=[endpoint]))
+        self.session = zenoh.open(
+            config("router", listen=[endpoint]) if router else config("client", connect=[endpoint])
+        )
         self.session.declare_subscriber(keys.every(SITE, keys.RobotTopic.KEYFRAME), self._hear_keyframe)
         self.session.declare_subscriber(keys.every(SITE, keys.RobotTopic.POSE), self._hear_pose)
         tokens = keys.every(SITE, keys.RobotTopic.ALIVE)
@@ -85,7 +94,7 @@ class Ground:
     def confirming(self, robot: str) -> RobotReport | None:
         """The report that confirms what was heard."""
         heard = [KeyframeId(boot=k.boot, sequence=k.sequence) for k in self.keyframes if k.robot == robot]
-        return report_on(robot, keyframe=heard[-1], boot=heard[-1].boot) if heard else None
+        return report_on(robot, keyframe=heard[-1], heard=heard[-1], boot=heard[-1].boot) if heard else None
 
     def _hear_keyframe(self, sample: zenoh.Sample) -> None:
         with self._news:

@@ -1,30 +1,26 @@
-"""Questions to a station over HTTP."""
+"""Questions to a station over HTTP about what is."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Annotated, TypeVar
+from typing import Annotated
 
 import typer
-from covista_schemas.reports import Report
-from rich.console import Console, RenderableType
 
 from covista_clients.commands import tables
-from covista_clients.commands.options import DEFAULT_URL, Format, Output, Token, Url
-from covista_clients.mission_control import MissionControl
-
-_R = TypeVar("_R", bound=Report)
+from covista_clients.commands.options import DEFAULT_URL, Authorities, Format, Output, Token, Url, station
+from covista_clients.commands.showing import show
 
 
-def robots(url: Url = DEFAULT_URL, token: Token = None, output: Output = Format.TABLE) -> None:
+def robots(url: Url = DEFAULT_URL, token: Token = None, ca: Authorities = None, output: Output = Format.TABLE) -> None:
     """Say which robots there are, where they stand, and what became of their messages."""
-    with MissionControl(url, token) as control:
-        _show(control.robots(), tables.robots, output)
+    with station(url, token, ca) as control:
+        show(control.robots(), tables.robots, output)
 
 
 def pairs(
     url: Url = DEFAULT_URL,
     token: Token = None,
+    ca: Authorities = None,
     output: Output = Format.TABLE,
     robot: Annotated[str | None, typer.Option(help="Only pairs of this robot.")] = None,
     min_overlap: Annotated[
@@ -33,24 +29,31 @@ def pairs(
     ] = None,
 ) -> None:
     """Say how much each pair of robots sees in common, and how that is known."""
-    with MissionControl(url, token) as control:
-        _show(control.pairs(robot, min_overlap), tables.pairs, output)
+    with station(url, token, ca) as control:
+        show(control.pairs(robot, min_overlap), tables.pairs, output)
 
 
-def similarity(url: Url = DEFAULT_URL, token: Token = None, output: Output = Format.TABLE) -> None:
+def similarity(
+    url: Url = DEFAULT_URL, token: Token = None, ca: Authorities = None, output: Output = Format.TABLE
+) -> None:
     """Say how similar all robots are, which is what they are grouped by."""
-    with MissionControl(url, token) as control:
-        _show(control.similarity(), tables.similarity, output)
+    with station(url, token, ca) as control:
+        show(control.similarity(), tables.similarity, output)
 
 
-def groups(url: Url = DEFAULT_URL, token: Token = None, output: Output = Format.TABLE) -> None:
+def groups(url: Url = DEFAULT_URL, token: Token = None, ca: Authorities = None, output: Output = Format.TABLE) -> None:
     """Say which robots belong together."""
-    with MissionControl(url, token) as control:
-        _show(control.groups(), tables.groups, output)
+    with station(url, token, ca) as control:
+        show(control.groups(), tables.groups, output)
 
 
-def _show(report: _R, table: Callable[[_R], RenderableType], output: Format) -> None:
-    if output is Format.JSON:
-        print(report.model_dump_json(indent=2))
-    else:
-        Console().print(table(report))
+def forget(
+    robot: Annotated[str, typer.Argument(help="Id of the robot.")],
+    url: Url = DEFAULT_URL,
+    token: Token = None,
+    ca: Authorities = None,
+) -> None:
+    """Have the station forget a robot, at once; one that goes on sending is a new one."""
+    with station(url, token, ca) as control:
+        control.forget(robot)
+    print(f"{robot} is forgotten")

@@ -7,7 +7,6 @@ import sys
 import threading
 
 import zenoh
-import zenoh.ext
 from covista_schemas import keys
 from covista_schemas.errors import LinkError
 from covista_schemas.reports import GroupsReport
@@ -17,7 +16,7 @@ from pydantic import ValidationError
 from covista_clients.commands import tables
 from covista_clients.commands.interrupting import ends_by_interrupt
 from covista_clients.commands.options import DEFAULT_CONNECT, Connect, Format, Output, Site
-from covista_clients.rover.link import open_with_retry
+from covista_clients.rover.link import follow, open_with_retry
 
 
 def watch(connect: Connect = DEFAULT_CONNECT, site: Site = "default", output: Output = Format.TABLE) -> None:
@@ -35,10 +34,7 @@ def watch(connect: Connect = DEFAULT_CONNECT, site: Site = "default", output: Ou
 
 def _print_all(session: zenoh.Session, key: str, output: Format) -> None:
     arrived: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-    history = zenoh.ext.HistoryConfig(detect_late_publishers=True)
-    subscriber = zenoh.ext.declare_advanced_subscriber(
-        session, key, lambda sample: arrived.put(sample.payload.to_bytes()), history=history
-    )
+    subscriber = follow(session, key, lambda sample: arrived.put(sample.payload.to_bytes()))
     with subscriber:
         while True:
             _print_one(arrived.get(), output)

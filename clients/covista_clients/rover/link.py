@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import random
 import threading
 import time
 from collections.abc import Callable
@@ -13,7 +14,7 @@ import zenoh
 import zenoh.ext
 from covista_schemas import codec, keys
 from covista_schemas.errors import LinkError
-from covista_schemas.reports import KeyframeId, OwnGroupReport, RobotReport
+from covista_schemas.reports import KeyframeId, OwnGroupReport, Problem, RobotReport
 from covista_schemas.zenoh_config import config
 from pydantic import ValidationError
 
@@ -23,6 +24,10 @@ logger = logging.getLogger(__name__)
 OPEN_TIMEOUT_MS = 1500
 _PAUSE_S = 0.1
 _ASK_EVERY_S = 0.03
+# After a router came back all its rovers ask at once: they ask again at different times.
+_ASK_AGAIN_S = (0.03, 0.2)
+# So many changes of the link are kept until somebody looks; the newest tell enough.
+_CHANGES_KEPT = 8
 # Groups that a slow callback may leave waiting; of more, the newest remain.
 _GROUPS_WAITING = 16
 # How long leaving waits for a callback that is at work.
@@ -40,6 +45,18 @@ def open_with_retry(endpoint: str, stop: threading.Event) -> zenoh.Session | Non
             logger.debug("no router at %s yet: %s", endpoint, error)
         stop.wait(_PAUSE_S)
     return None
+
+
+def follow(session: zenoh.Session, key: str, handler: Any) -> zenoh.ext.AdvancedSubscriber[Any]:
+    """Hear what the station tells on `key`: the last value at once, and what was missed as soon as that is noticed."""
+    return zenoh.ext.declare_advanced_subscriber(
+        session,
+        key,
+        handler,
+        # Late publishers too: a station that starts after the rover says where the rover stands.
+        history=zenoh.ext.HistoryConfig(detect_late_publishers=True),
+        recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
+    )
 
 
 class RoverLink:
@@ -73,7 +90,11 @@ class RoverLink:
             priority=zenoh.Priority.INTERACTIVE_HIGH,
             express=True,
         )
+        # Rings to be looked into, no callbacks: see `follow_group`.
+        self._matching = self._keyframes.declare_matching_listener(zenoh.handlers.RingChannel(_CHANGES_KEPT))
+        self._links = session.info.declare_link_events_listener(zenoh.handlers.RingChannel(_CHANGES_KEPT))
         self._undo: list[Callable[[], object]] = [self._keyframes.undeclare, self._poses.undeclare]
+        self._undo += [self._matching.undeclare, self._links.undeclare]
         if token:
             self._undo.append(session.liveliness().declare_token(keys.alive(site, robot, boot)).undeclare)
 
@@ -84,6 +105,15 @@ class RoverLink:
     def poses_wanted(self) -> bool:
         """Whether a station listens to poses right now."""
         return _has_listeners(self._poses)
+
+    def broke(self) -> bool:
+        """Whether, since this was asked last, the way to the station broke: what was put just before may be lost."""
+        broken = False
+        while (status := self._matching.try_recv()) is not None:
+            broken |= not status.matching
+        while (event := self._links.try_recv()) is not None:
+            broken |= event.kind == zenoh.SampleKind.DELETE
+        return broken
 
     def put_pose(self, data: bytes) -> None:
         """Send a pose, or drop it where the link is congested."""
@@ -105,13 +135,8 @@ class RoverLink:
 
     def follow_group(self, callback: OnGroup) -> None:
         """Call `callback` with the robot's group, the present one first, from a thread of its own."""
-        # Late publishers too: a station that starts after the rover says where the rover stands.
-        subscriber = zenoh.ext.declare_advanced_subscriber(
-            self._session,
-            keys.own_group(self._site, self._robot),
-            zenoh.handlers.RingChannel(_GROUPS_WAITING),
-            history=zenoh.ext.HistoryConfig(detect_late_publishers=True),
-        )
+        key = keys.own_group(self._site, self._robot)
+        subscriber = follow(self._session, key, zenoh.handlers.RingChannel(_GROUPS_WAITING))
         # No callback of zenoh's: its thread cannot be joined, and one that outlives the interpreter aborts the program.
         name = f"rover-{self._robot}-groups"
         follower = threading.Thread(target=self._follow, args=(subscriber, callback), name=name, daemon=True)
@@ -121,6 +146,18 @@ class RoverLink:
     def report(self, timeout_s: float) -> RobotReport | None:
         """What the station knows of this robot, or None where it does not answer."""
         return ask_report(self._session, self._site, self._robot, timeout_s)
+
+    def hear_back(self, within_s: float, stop: threading.Event) -> RobotReport | None:
+        """What the station knows of this robot; None where it knows nothing, or says nothing in time."""
+        deadline_s = time.monotonic() + within_s
+        while not stop.is_set() and (left_s := deadline_s - time.monotonic()) > 0:
+            for reply in self._session.get(keys.robot_report(self._site, self._robot), timeout=left_s):
+                if reply.ok is not None:
+                    return _read_report(self._robot, reply.ok)
+                if reply.err is not None and _is_unknown(reply.err):
+                    return None
+            stop.wait(min(random.uniform(*_ASK_AGAIN_S), left_s))
+        return None
 
     def confirm(self, last: int, deadline_s: float) -> bool:
         """Wait until the station has heard of keyframe `last` of this boot; False after `deadline_s` (monotonic)."""
@@ -168,11 +205,23 @@ def ask_report(session: zenoh.Session, site: str, robot: str, timeout_s: float) 
     """What the station knows of `robot`, or None where it does not answer (in time), or does not know it."""
     for reply in session.get(keys.robot_report(site, robot), timeout=timeout_s):
         if reply.ok is not None:
-            try:
-                return RobotReport.read(reply.ok.payload.to_bytes())
-            except ValidationError as error:
-                raise LinkError(f"the station's report on {robot} cannot be read: {error}") from error
+            return _read_report(robot, reply.ok)
     return None
+
+
+def _read_report(robot: str, sample: zenoh.Sample) -> RobotReport:
+    try:
+        return RobotReport.read(sample.payload.to_bytes())
+    except ValidationError as error:
+        raise LinkError(f"the station's report on {robot} cannot be read: {error}") from error
+
+
+def _is_unknown(error: zenoh.ReplyError) -> bool:
+    """Whether the station says that it does not know the robot; it may be busy instead, or the time be over."""
+    try:
+        return Problem.read(error.payload.to_bytes()).status == 404
+    except ValidationError:
+        return False
 
 
 def has_heard(report: RobotReport, keyframe: KeyframeId) -> bool:

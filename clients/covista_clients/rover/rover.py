@@ -8,6 +8,7 @@ import threading
 import time
 import uuid
 from collections.abc import Callable
+from functools import partial
 from types import TracebackType
 from typing import Self
 
@@ -15,10 +16,11 @@ import zenoh
 from covista_schemas import codec, keys
 from covista_schemas.errors import LinkError
 from covista_schemas.messages import Camera, Keyframe, Pose, PoseUpdate
-from covista_schemas.reports import KeyframeId
+from covista_schemas.reports import KeyframeId, RobotReport
 from covista_schemas.zenoh_config import check_endpoint
 
 from covista_clients.rover.content import Content, Image, Send, prepare
+from covista_clients.rover.last_words import LastWords
 from covista_clients.rover.link import OnGroup, RoverLink, open_with_retry
 from covista_clients.rover.outbox import Outbox
 
@@ -27,15 +29,20 @@ logger = logging.getLogger(__name__)
 CLOSE_TIMEOUT_S = 2.0
 # How soon what waits is sent once a station listens.
 _LOOK_EVERY_S = 0.05
+# How soon a rover that says nothing notices that its link broke.
+_LOOK_BACK_EVERY_S = 0.5
+# How long the station may take to say what it heard before.
+_HEAR_BACK_S = 1.0
 
 
 class Rover:
     """Sends poses and keyframes of one camera to a station, and hears which group the robot is in.
 
     Connects in the background and for as long as it takes; until a station listens, the newest keyframe and the newest
-    pose are kept. Close it, or use it as a context manager: closing waits until the station has confirmed the last
-    keyframe, at most two seconds. Safe to use from several threads; not from inside an `on_group` callback, where only
-    `send_pose` and `send_keyframe` may be called.
+    pose are kept. When a link that broke stands again, the newest that went out before are sent again, unless the
+    station has heard them. Close it, or use it as a context manager: closing waits until the station has confirmed the
+    last keyframe, at most two seconds. Safe to use from several threads; not from inside an `on_group` callback, where
+    only `send_pose` and `send_keyframe` may be called.
     """
 
     def __init__(
@@ -62,6 +69,8 @@ class Rover:
         self.keyframes_sent = 0
         self.poses_sent = 0
         self._last_sent: int | None = None
+        self._last_words = LastWords(self.boot)
+        self._in_doubt = False
         self._connect = connect if session is not None else check_endpoint(connect)
         self._token = liveliness
         self._outbox: Outbox[tuple[Pose, Callable[[], Content]]] = Outbox()
@@ -83,6 +92,21 @@ class Rover:
     def replaced(self) -> int:
         """Keyframes that gave way to newer ones before they were sent."""
         return self._outbox.replaced
+
+    @property
+    def keyframes_resent(self) -> int:
+        """Keyframes that were sent again because the link broke and the station had not heard them."""
+        return self._last_words.keyframes_resent
+
+    @property
+    def poses_resent(self) -> int:
+        """Poses that were sent again because the link broke and the station had not heard them."""
+        return self._last_words.poses_resent
+
+    @property
+    def keyframes_lost(self) -> int:
+        """Keyframes that were sent, went down with a link and were not sent again, as the station says."""
+        return self._last_words.keyframes_lost
 
     def send_pose(self, pose: Pose) -> None:
         """Send where the camera is; kept, until a newer one comes, while no station listens."""
@@ -161,14 +185,53 @@ class Rover:
             self._attach(session, owned=True)
         link = self._link
         while link is not None and not self._outbox.closed:
+            if self._doubts(link) and link.keyframes_wanted():
+                self._catch_up(link)
             with self._pose_news:
                 self._flush_pose()
                 held = self._held_pose is not None
-            taken = self._outbox.take(link.keyframes_wanted, 0 if held else None)
+            taken = self._outbox.take(partial(self._may_send, link), self._patience_s(held))
             if taken is not None:
                 self._send_keyframe(link, *taken)
-            elif held or self._outbox.waits:
+            elif held or self._outbox.waits or self._in_doubt:
                 self._stop.wait(_LOOK_EVERY_S)
+
+    def _patience_s(self, held: bool) -> float | None:
+        """How long to wait for the next keyframe before there may be something else to do."""
+        if held or self._in_doubt:
+            return 0.0
+        return _LOOK_BACK_EVERY_S if self._last_words.any else None
+
+    def _may_send(self, link: RoverLink) -> bool:
+        """A new keyframe must not hide from the station's report what was lost before it."""
+        return not self._doubts(link) and link.keyframes_wanted()
+
+    def _doubts(self, link: RoverLink) -> bool:
+        """Whether what was sent last may not have arrived."""
+        if link.broke():
+            self._in_doubt = self._last_words.any
+        return self._in_doubt
+
+    def _catch_up(self, link: RoverLink) -> None:
+        """Say again what was said last, unless the station has heard it."""
+        try:
+            report = link.hear_back(_HEAR_BACK_S, self._stop)
+            if not link.broke():
+                self._in_doubt = False
+                self._say_again(link, report)
+        except (LinkError, zenoh.ZError):
+            self._in_doubt = False
+            logger.exception("%s could not find out what the station has heard", self.robot)
+
+    def _say_again(self, link: RoverLink, report: RobotReport | None) -> None:
+        keyframe = self._last_words.unheard_keyframe(report, superseded=self._outbox.waits)
+        if keyframe is not None:
+            # Nothing may follow it for long.
+            link.put_last_keyframe(keyframe)
+        with self._pose_news:
+            pose = self._last_words.unheard_pose(report) if self._held_pose is None else None
+            if pose is not None:
+                link.put_pose(pose)
 
     def _send_keyframe(self, link: RoverLink, sequence: int, item: tuple[Pose, Callable[[], Content]]) -> None:
         pose, work = item
@@ -178,20 +241,24 @@ class Rover:
                 self.robot, self.boot, sequence, self.camera, pose, content.image, content.features, content.thumbnail
             )
             put = link.put_last_keyframe if self._closing else link.put_keyframe
-            put(codec.encode_keyframe(keyframe))
+            data = codec.encode_keyframe(keyframe)
+            put(data)
         except Exception:
             # One picture that OpenCV or the link refuses must not silence the rover.
             logger.exception("%s could not send keyframe %d", self.robot, sequence)
         else:
             self.keyframes_sent += 1
             self._last_sent = sequence
+            self._last_words.keyframe_sent(sequence, data)
 
     def _flush_pose(self) -> None:
         """Send the pose that waits, if a station listens; call with `_pose_news` held."""
         if self._held_pose is None or self._link is None or not self._link.poses_wanted():
             return
         update = PoseUpdate(self.robot, self.boot, self.poses_sent, self._held_pose)
-        self._link.put_pose(codec.encode_pose(update))
+        data = codec.encode_pose(update)
+        self._link.put_pose(data)
+        self._last_words.pose_sent(update.pose.time_ns, data)
         self.poses_sent += 1
         self._held_pose = None
         self._pose_news.notify_all()

@@ -1,10 +1,12 @@
 """What the station tells over zenoh: the groups, each robot's own group, and events.
 
-The last value of each key is kept for advanced subscribers that come late. A thread of its own puts, so that a slow
-peer costs the loop nothing; where it cannot keep up, only the newest value of a key goes out.
+The last value of each key, and some hundred events, are kept for advanced subscribers that come late. What a subscriber
+missed, because it slept or its link was away, it notices by the heartbeats of the key and asks for again. A thread of
+its own puts, so that a slow peer costs the loop nothing; where it cannot keep up, only the newest of a key goes out.
 
 What a subscriber does not take is dropped for that subscriber alone, once it has held up the others for as long as
-`session.WAIT_US`. (Blocking, zenoh waits five seconds for one that is stopped, and everybody else with it.)
+`session.WAIT_US`. (Blocking, zenoh waits five seconds for one that is stopped, and everybody else with it.) The same
+goes for heartbeats and for what is sent again: who loses that too asks after the next heartbeat.
 """
 
 from __future__ import annotations
@@ -24,6 +26,12 @@ from covista_service.station.snapshot import Snapshot
 from covista_service.telemetry import about
 
 MAX_EVENTS = 1000
+# Kept for who comes late or missed some; of groups the newest says all.
+EVENTS_KEPT = 500
+# How soon a subscriber notices that the last value passed it by.
+HEARTBEAT_S = 1.0
+# A thousand rovers have a key each, and changes of their groups are rare.
+OWN_HEARTBEAT_S = 5.0
 
 log = logging.getLogger(__name__)
 
@@ -108,15 +116,26 @@ class Publisher:
 
     def _put(self, key: str, text: str) -> None:
         if key not in self._publishers:
-            self._publishers[key] = ext.declare_advanced_publisher(
-                self._session,
-                key,
-                cache=ext.CacheConfig(1),
-                publisher_detection=True,
-                encoding=zenoh.Encoding.APPLICATION_JSON,
-                congestion_control=zenoh.CongestionControl.DROP,
-            )
+            self._publishers[key] = self._declare(key)
         self._publishers[key].put(text)
+
+    def _declare(self, key: str) -> ext.AdvancedPublisher:
+        kept = EVENTS_KEPT if key == keys.events(self._site) else 1
+        whole = key in (keys.events(self._site), keys.groups(self._site))
+        replies = ext.RepliesConfig(congestion_control=zenoh.CongestionControl.DROP)
+        # Not sporadic heartbeats: zenoh sends those blocking.
+        heartbeat = ext.MissDetectionConfig(
+            heartbeat=HEARTBEAT_S if whole else OWN_HEARTBEAT_S, sporadic_heartbeat=None
+        )
+        return ext.declare_advanced_publisher(
+            self._session,
+            key,
+            cache=ext.CacheConfig(kept, replies_config=replies),
+            sample_miss_detection=heartbeat,
+            publisher_detection=True,
+            encoding=zenoh.Encoding.APPLICATION_JSON,
+            congestion_control=zenoh.CongestionControl.DROP,
+        )
 
     def _forget(self, snapshot: Snapshot) -> None:
         """Robots that are forgotten need no publisher any more."""

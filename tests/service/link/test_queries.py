@@ -3,13 +3,15 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 import zenoh
 from covista_schemas import keys
 from covista_schemas.reports import GroupsReport, PairReport, Problem, RobotReport, SimilarityReport
+from covista_schemas.zenoh_config import MAX_REPLY_BYTES
 from covista_service import answers
 from covista_service.link.queries import MAX_WAITING, Queries, Replies
-from covista_service.station.snapshot import Snapshot
+from covista_service.station.snapshot import SimilarityView, Snapshot
 
 from tests.service.deadline import wait_until
 from tests.service.link.conftest import Air
@@ -146,6 +148,38 @@ def test_what_is_large_is_made_once_while_it_stands(snapshot: Snapshot) -> None:
     similarity = SimilarityReport.model_validate_json(replies.to(keys.similarity(SITE), later).to_bytes())
     assert similarity == answers.similarity_report(later)
     assert GroupsReport.model_validate_json(replies.to(keys.groups(SITE), later).to_bytes()).scores[0].score == 0.5
+
+
+def test_what_is_larger_than_clients_take_is_refused_with_where_to_get_it(air: Air, snapshot: Snapshot) -> None:
+    n = 1000
+    matrix = np.random.default_rng(0).random((n, n))
+    large = replace(
+        snapshot,
+        similarity=SimilarityView(5, tuple(f"r{i}" for i in range(n)), 1.0, matrix, matrix, matrix),
+    )
+    queries = Queries(air.station, "large", lambda: large)
+    try:
+        problems = []
+        for _ in range(2):
+            reply = ask(air, keys.similarity("large"))
+            assert reply.err is not None
+            problems.append(Problem.model_validate_json(reply.err.payload.to_bytes()))
+    finally:
+        queries.close()
+    assert {(problem.title, problem.status) for problem in problems} == {("Too large for zenoh", 413)}
+    assert "GET /api/v1/similarity" in str(problems[0].detail)
+
+
+def test_what_clients_just_take_arrives(air: Air, snapshot: Snapshot, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = "x" * (MAX_REPLY_BYTES - 2)
+    monkeypatch.setattr(answers, "similarity_json", lambda snapshot: iter([f'"{text}"'.encode()]))
+    queries = Queries(air.station, "brim", lambda: snapshot)
+    try:
+        reply = ask(air, keys.similarity("brim"))
+    finally:
+        queries.close()
+    assert reply.ok is not None
+    assert len(reply.ok.payload) == MAX_REPLY_BYTES
 
 
 def test_a_fault_in_one_answer_costs_that_answer_alone(
