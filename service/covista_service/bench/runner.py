@@ -17,7 +17,10 @@ from covista_service.bench import (
     predict_planes,
     predict_poses,
     predict_surfaces,
+    rest,
+    restart,
     scale,
+    sse,
     surface,
     survey,
 )
@@ -35,6 +38,9 @@ BENCHES: Mapping[str, Sequence[Bench]] = {
     "scale": (scale.rows,),
     "memory": (memory.rows,),
     "overload": (overload.rows,),
+    "rest": (rest.rows,),
+    "restart": (restart.rows,),
+    "sse": (sse.rows,),
 }
 
 
