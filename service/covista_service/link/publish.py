@@ -6,7 +6,7 @@ its own puts, so that a slow peer costs the loop nothing; where it cannot keep u
 
 What a subscriber does not take is dropped for that subscriber alone, once it has held up the others for as long as
 `session.WAIT_US`. (Blocking, zenoh waits five seconds for one that is stopped, and everybody else with it.) The same
-goes for heartbeats and for what is sent again: who loses that too asks after the next heartbeat.
+goes for heartbeats. What is sent again is not: it goes out in zenoh's threads, of a lower priority.
 """
 
 from __future__ import annotations
@@ -122,7 +122,9 @@ class Publisher:
     def _declare(self, key: str) -> ext.AdvancedPublisher:
         kept = EVENTS_KEPT if key == keys.events(self._site) else 1
         whole = key in (keys.events(self._site), keys.groups(self._site))
-        replies = ext.RepliesConfig(congestion_control=zenoh.CongestionControl.DROP)
+        # What is sent again is not asked for twice, so it waits for its link; in a queue of its own, which holds up
+        # nothing but itself.
+        replies = ext.RepliesConfig(congestion_control=zenoh.CongestionControl.BLOCK, priority=zenoh.Priority.DATA_LOW)
         # Not sporadic heartbeats: zenoh sends those blocking.
         heartbeat = ext.MissDetectionConfig(
             heartbeat=HEARTBEAT_S if whole else OWN_HEARTBEAT_S, sporadic_heartbeat=None

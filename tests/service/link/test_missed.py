@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 import pytest
@@ -33,19 +34,49 @@ with Rover("r1", camera, sys.argv[1], site=sys.argv[2]) as rover:
     sys.stdin.read()
 """
 
+# Prints what it hears of the events: with recovery, and beside it without.
+LISTENERS = """
+import sys
+import zenoh
+from covista_clients.rover.link import follow
+from covista_schemas import keys
+from covista_schemas.reports import EventReport
+from covista_schemas.zenoh_config import config
 
-def events(first: int, last: int) -> tuple[EventReport, ...]:
-    return tuple(EventReport(id=i, event=EventKind.STATUS, time=time_of(i), text="x") for i in range(first, last + 1))
+def tell(name):
+    # One write a line: two threads tell.
+    return lambda sample: sys.stdout.write(f"{name} {EventReport.read(sample.payload.to_bytes()).id}\\n")
+
+sys.stdout.reconfigure(line_buffering=True)
+key = keys.events(sys.argv[2])
+with zenoh.open(config("client", connect=[sys.argv[1]])) as session:
+    subscribers = follow(session, key, tell("all")), session.declare_subscriber(key, tell("some"))
+    print("ready", flush=True)
+    sys.stdin.read()
+"""
+
+
+def events(first: int, last: int, text: str = "x") -> tuple[EventReport, ...]:
+    return tuple(EventReport(id=i, event=EventKind.STATUS, time=time_of(i), text=text) for i in range(first, last + 1))
+
+
+@contextmanager
+def listening(script: str, endpoint: str, site: str) -> Iterator[subprocess.Popen[str]]:
+    """The script in a process of its own."""
+    command = [sys.executable, "-c", script, endpoint, site]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
 
 
 @pytest.fixture
 def rover(air: Air) -> Iterator[subprocess.Popen[str]]:
-    """A rover in a process of its own, which prints what it is told of its group."""
-    command = [sys.executable, "-c", ROVER, air.endpoint, SITE]
-    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    yield process
-    process.kill()
-    process.communicate()
+    """A rover that prints what it is told of its group."""
+    with listening(ROVER, air.endpoint, SITE) as process:
+        yield process
 
 
 def heard(rover: subprocess.Popen[str]) -> OwnGroupReport:
@@ -123,3 +154,32 @@ def test_who_comes_late_hears_the_last_some_hundred_events_in_order(air: Air) ->
     finally:
         publisher.close()
     assert numbers == list(range(101, EVENTS_KEPT + 102))
+
+
+def test_what_a_busy_subscriber_was_not_sent_it_asks_for(air: Air) -> None:
+    """It pauses for less than its lease, and more is told than the line to it holds."""
+    heard: dict[str, list[int]] = {"all": [], "some": []}
+    last, text = EVENTS_KEPT - 20, "x" * 40_000
+    publisher = Publisher(air.station, "busy")
+    with listening(LISTENERS, air.endpoint, "busy") as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        try:
+            publisher.take(News(Scene().snapshot, events(1, 1), False, ()))
+            while not (heard["all"] and heard["some"]):
+                note(heard, process.stdout.readline())
+            process.send_signal(signal.SIGSTOP)
+            publisher.take(News(Scene().snapshot, events(2, last, text), False, ()))
+            wait_until(lambda: publisher.status().waiting == 0 and publisher.status().told == last)
+            process.send_signal(signal.SIGCONT)
+            while len(heard["all"]) < last:
+                note(heard, process.stdout.readline())
+        finally:
+            publisher.close()
+    assert heard["all"] == list(range(1, last + 1))
+    assert len(heard["some"]) < last
+
+
+def note(heard: dict[str, list[int]], line: str) -> None:
+    name, number = line.split()
+    heard[name].append(int(number))
