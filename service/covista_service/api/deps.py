@@ -14,6 +14,7 @@ from fastapi import Depends, Path, Request, Response
 
 from covista_service.access import Gate
 from covista_service.answers.past import Archive
+from covista_service.answers.texts import Texts
 from covista_service.api.delivery import deliver
 from covista_service.api.outgoing import Outgoing
 from covista_service.api.rooms import Room
@@ -45,6 +46,7 @@ class Parts:
     flush: Callable[[float], bool]
     stream: Stream
     outgoing: Outgoing = field(default_factory=Outgoing)
+    texts: Texts = field(default_factory=Texts)
     readers: Room = field(default_factory=lambda: Room(at_once=3, waiting=200))
     previews: Room = field(default_factory=lambda: Room(at_once=1, waiting=20))
     # Who changes settings begins with those that the one before has left.
@@ -96,23 +98,24 @@ def answer(report: Report, outgoing: Outgoing | None = None) -> Response:
     return Response(text, media_type=JSON) if outgoing is None else deliver(text.encode(), outgoing, JSON)
 
 
-def answer_unless_known(request: Request, tag: str, build: Callable[[], Response]) -> Response:
+def answer_unless_known(request: Request, tag: str | bytes, build: Callable[[], Response]) -> Response:
     """304 for who has this version already (RFC 9110, If-None-Match), else what `build` makes, with its tag."""
     return tagged(Response(status_code=304) if is_known(request, tag) else build(), tag)
 
 
-def is_known(request: Request, tag: str) -> bool:
+def is_known(request: Request, tag: str | bytes) -> bool:
     """Does who asks say that they have this version already?"""
     known = [each.strip().removeprefix("W/") for each in request.headers.get("if-none-match", "").split(",")]
     return _etag(tag) in known or known == ["*"]
 
 
-def tagged(response: Response, tag: str) -> Response:
+def tagged(response: Response, tag: str | bytes) -> Response:
     """The answer, with its version."""
     response.headers["ETag"] = _etag(tag)
     response.headers["Vary"] = "Accept"
     return response
 
 
-def _etag(tag: str) -> str:
-    return f'"{hashlib.blake2s(tag.encode(), digest_size=12).hexdigest()}"'
+def _etag(tag: str | bytes) -> str:
+    content = tag.encode() if isinstance(tag, str) else tag
+    return f'"{hashlib.blake2s(content, digest_size=12).hexdigest()}"'

@@ -12,7 +12,7 @@ from covista_service import answers
 from covista_service.answers import NotKnownError
 from covista_service.answers.past import PAGE, Archive
 from covista_service.api import examples
-from covista_service.api.deps import PartsNow, SnapshotNow, answer, answer_unless_known
+from covista_service.api.deps import JSON, PartsNow, SnapshotNow, answer, answer_unless_known
 from covista_service.api.errors import describe
 from covista_service.api.past import (
     PROBLEMS,
@@ -34,11 +34,11 @@ LabelPath = Annotated[str, Path(description="Label of a group.", examples=["g1"]
 
 
 @router.get("", response_model=GroupsReport, responses={**examples.show(examples.GROUPS), **examples.UNCHANGED})
-def groups(request: Request, snapshot: SnapshotNow) -> Response:
+async def groups(request: Request, parts: PartsNow, snapshot: SnapshotNow) -> Response:
     """Who belongs together, and why so many groups."""
-    report = answers.groups_report(snapshot)
-    # Scores move without a new revision.
-    return answer_unless_known(request, report.model_dump_json(), lambda: answer(report))
+    # Scores move without a new revision, so the content itself is what tells versions apart.
+    content = parts.texts.groups(snapshot)
+    return answer_unless_known(request, content, lambda: Response(content, media_type=JSON))
 
 
 @router.get("/history", response_model=GroupsHistory, responses={**examples.show(examples.GROUPS_HISTORY), **PROBLEMS})

@@ -8,7 +8,8 @@ from fastapi import APIRouter, Response
 from covista_service import answers
 from covista_service.answers.past import PAGE
 from covista_service.api import examples
-from covista_service.api.deps import AskerNow, PartsNow, RobotPath, SnapshotNow, answer
+from covista_service.api.delivery import deliver
+from covista_service.api.deps import JSON, AskerNow, PartsNow, RobotPath, SnapshotNow, answer
 from covista_service.api.errors import describe
 from covista_service.api.past import (
     PROBLEMS,
@@ -27,8 +28,12 @@ router = APIRouter(prefix="/robots", tags=["robots"])
 
 
 @router.get("", response_model=RobotsReport, responses={**examples.show(examples.ROBOTS), **describe(503)})
-def robots(parts: PartsNow, snapshot: SnapshotNow, limit: LimitQuery = None, cursor: RobotsCursor = None) -> Response:
+async def robots(
+    parts: PartsNow, snapshot: SnapshotNow, limit: LimitQuery = None, cursor: RobotsCursor = None
+) -> Response:
     """All robots in the order of their ids: presence, group, pose, camera, and what became of their messages."""
+    if limit is None and cursor is None:
+        return deliver(await parts.texts.robots(snapshot), parts.outgoing, JSON)
     return answer(answers.robots_page(snapshot, cursor, limit), parts.outgoing)
 
 
