@@ -258,7 +258,9 @@ def test_an_entry_that_cannot_be_stored_does_not_take_the_others_with_it(url: st
     assert ask(url, "select lost from gaps") == [(1,)]
 
 
-@pytest.mark.parametrize("url", ["nonsense://somewhere/db", "sqlite:///covista.db?timeout=long"])
+@pytest.mark.parametrize(
+    "url", ["nonsense://somewhere/db", "sqlite:///covista.db?timeout=long", "sqlite://", "sqlite:///:memory:"]
+)
 def test_a_url_that_can_never_work_is_a_mistake_in_the_settings(url: str) -> None:
     with pytest.raises(DatabaseError, match=r"setting database \(--database, COVISTA_DATABASE\)"):
         check_url(url)
