@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -57,15 +58,21 @@ def recalled(url: str) -> Memory:
 
 
 def remembered(history: History, scene: Scene) -> None:
-    """Wait until two looks later: what is to be remembered then is written."""
+    """Wait until two looks later: what is to be remembered then is written. Afterwards nobody looks."""
     looks: list[None] = []
+    one_at_a_time, done = threading.Lock(), threading.Event()
 
     def look() -> object:
-        looks.append(None)
-        return scene.snapshot
+        with one_at_a_time:
+            if done.is_set():
+                raise TimeoutError
+            looks.append(None)
+            return scene.snapshot
 
     history.follow(look)
     wait_until(lambda: len(looks) > 2)
+    with one_at_a_time:
+        done.set()
 
 
 def test_what_is_recalled_is_what_stood(url: str) -> None:
@@ -107,14 +114,18 @@ def test_pairs_that_are_too_many_for_one_look_are_written_with_the_next(
 
 
 def test_keyframes_that_nothing_names_any_more_go(file: Path) -> None:
-    scene = swarm()
-    with kept(f"sqlite:///{file}") as history:
-        history.follow(lambda: scene.snapshot)
-        for _ in range(3):
+    scene, steps = swarm(), iter(range(3))
+
+    def look() -> object:
+        for _ in zip(range(1), steps, strict=False):
             scene.now_ns += S
             for number in range(4):
                 scene.send(f"r{number}", pose(0.5 * number))
             scene.settle(lambda job: measured(0.3, 0.4))
+        return scene.snapshot
+
+    with kept(f"sqlite:///{file}") as history:
+        history.follow(look)
         question = "select robot, sequence from keyframes_now order by robot, sequence"
         named = [(f"r{number}", 3) for number in range(4)]
         wait_until(lambda: ask(f"sqlite:///{file}", question) == named, "only those in use are left")
