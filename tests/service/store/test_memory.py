@@ -4,13 +4,16 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from covista_service.loop import News
 from covista_service.station.events import ForgetRobot
 from covista_service.station.memory import Memory
 from covista_service.station.remembering import remember
+from covista_service.store import present
 from covista_service.store.archive import Archive
 from covista_service.store.history import History
 from covista_service.store.numbers import BLOCK, LastNumbers, ahead
@@ -55,15 +58,21 @@ def recalled(url: str) -> Memory:
 
 
 def remembered(history: History, scene: Scene) -> None:
-    """Wait until two looks later: what is to be remembered then is written."""
+    """Wait until two looks later: what is to be remembered then is written. Afterwards nobody looks."""
     looks: list[None] = []
+    one_at_a_time, done = threading.Lock(), threading.Event()
 
     def look() -> object:
-        looks.append(None)
-        return scene.snapshot
+        with one_at_a_time:
+            if done.is_set():
+                raise TimeoutError
+            looks.append(None)
+            return scene.snapshot
 
     history.follow(look)
     wait_until(lambda: len(looks) > 2)
+    with one_at_a_time:
+        done.set()
 
 
 def test_what_is_recalled_is_what_stood(url: str) -> None:
@@ -90,6 +99,37 @@ def test_what_has_changed_is_recalled_as_it_is_now(url: str) -> None:
         )
         names = {(row[0], row[1]) for row in ask(url, "select robot, sequence from keyframes_now")}
         assert {("r1", 1), ("r5", 0)} <= names
+
+
+def test_pairs_that_are_too_many_for_one_look_are_written_with_the_next(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(present, "_MOST_PAIRS", 1)
+    scene = swarm()
+    assert len(scene.snapshot.records) > 3
+    with kept(f"sqlite:///{file}") as history:
+        history.take(News(scene.snapshot, (), True, ()))
+        history.follow(lambda: scene.snapshot)
+        wait_until(lambda: same(history.recall(FOR_EVER_S, FOR_EVER_S), remember(scene.snapshot)), "all is written")
+
+
+def test_keyframes_that_nothing_names_any_more_go(file: Path) -> None:
+    scene, steps = swarm(), iter(range(3))
+
+    def look() -> object:
+        for _ in zip(range(1), steps, strict=False):
+            scene.now_ns += S
+            for number in range(4):
+                scene.send(f"r{number}", pose(0.5 * number))
+            scene.settle(lambda job: measured(0.3, 0.4))
+        return scene.snapshot
+
+    with kept(f"sqlite:///{file}") as history:
+        history.follow(look)
+        question = "select robot, sequence from keyframes_now order by robot, sequence"
+        named = [(f"r{number}", 3) for number in range(4)]
+        wait_until(lambda: ask(f"sqlite:///{file}", question) == named, "only those in use are left")
+        assert same(history.recall(FOR_EVER_S, FOR_EVER_S), replace(remember(scene.snapshot), groups={}))
 
 
 def test_a_station_that_recalls_stands_where_the_other_stood(url: str) -> None:
