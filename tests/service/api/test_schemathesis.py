@@ -37,11 +37,19 @@ def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         with running_station(settings_for(tmp_path_factory.mktemp("station"))) as station:
             wait_until(lambda: httpx.get(f"{station.url}/readyz").json()["status"] == "ready", "it is ready", 100)
             air = zenoh.open(config("client", connect=[station.link[0]]))
-            for number in range(ROBOTS):
-                air.put(keys.keyframe("default", f"r{number}"), keyframe_bytes(f"r{number}", 0.4 * number))
+            wait_until(lambda: _heard(station.url, air), "all robots are heard of")
             wait_until(lambda: _measured(station.url), "all pairs are measured")
             yield station.url
             air.close()
+
+
+def _heard(url: str, air: zenoh.Session) -> bool:
+    """Are all robots known? Who is not says again what he sees."""
+    known = {robot["id"] for robot in httpx.get(f"{url}/api/v1/robots").json()["robots"]}
+    missing = [number for number in range(ROBOTS) if f"r{number}" not in known]
+    for number in missing:
+        air.put(keys.keyframe("default", f"r{number}"), keyframe_bytes(f"r{number}", 0.4 * number))
+    return not missing
 
 
 def _measured(url: str) -> bool:
