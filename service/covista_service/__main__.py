@@ -16,6 +16,7 @@ from covista_service.evaluation.calibration_command import calibrate
 from covista_service.evaluation.command import evaluate
 from covista_service.evaluation.paper.command import paper
 from covista_service.evaluation.planted.command import planted
+from covista_service.token_command import token
 
 # The cores are shared out by the station's workers, and a picture's head may not claim what would not be decoded:
 # BLAS and OpenCV read this when they are first imported.
@@ -93,6 +94,7 @@ def _refuse(line: str, status: int) -> None:
 
 for _command in (demo, evaluate, calibrate, paper, planted, bench):
     application.command()(_command)
+application.add_typer(token)
 
 
 def main() -> None:

@@ -7,13 +7,13 @@ import logging
 import secrets
 import time
 from collections.abc import AsyncIterator, Callable
-from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from contextlib import AsyncExitStack, asynccontextmanager, closing, suppress
 
 from covista_schemas.reports import Health, PartHealth
 from fastapi import FastAPI
 
 from covista_service import answers
-from covista_service.access import check_listening
+from covista_service.access import Gate, Keyring, TokenError, TokenWatch, check_listening, is_loopback
 from covista_service.api import rest
 from covista_service.api.deps import Parts, State
 from covista_service.api.stream import Stream
@@ -33,6 +33,7 @@ from covista_service.store.archive import Archive
 from covista_service.store.database import check_url
 from covista_service.store.history import History
 from covista_service.store.retention import Retention
+from covista_service.store.tokens import Tokens
 from covista_service.telemetry import Telemetry, about
 from covista_service.workers import Workers, WorkersOptions, check_kind, daemon
 
@@ -45,10 +46,12 @@ _SILENT_S = 2.0
 def create_app(settings: Settings) -> FastAPI:
     """The station as an ASGI application; its lifespan opens and closes all.
 
-    Raises AccessError, DatabaseError or MissingExtraError.
+    Raises AccessError, DatabaseError, TokenError or MissingExtraError.
     """
-    check_listening(settings.api_address.host, settings.link, insecure=settings.insecure)
     check_url(settings.database)
+    check_listening(
+        settings.api_address.host, settings.link, insecure=settings.insecure, has_tokens=lambda: _has_tokens(settings)
+    )
     check_kind(settings.workers)
 
     @asynccontextmanager
@@ -56,7 +59,16 @@ def create_app(settings: Settings) -> FastAPI:
         async with _open_parts(settings) as parts:
             yield {"parts": parts}
 
-    return rest.build(lifespan)
+    return rest.build(lifespan, settings.cors_origins)
+
+
+def _has_tokens(settings: Settings) -> bool:
+    """Whether anybody can be let in. Raises TokenError, for who cannot know that must not listen to everybody."""
+    try:
+        with closing(Tokens(settings.database)) as tokens:
+            return any(token.revoked_us is None for token in tokens.read())
+    except TokenError as error:
+        raise TokenError(f"{error}; api = {settings.api} is not opened to the network before that is known") from error
 
 
 @asynccontextmanager
@@ -79,7 +91,7 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
         history = await asyncio.to_thread(lambda: History(settings.database, retention=retention))
         close_later(history.close)
         settings = with_stored(settings, history.stored_settings())
-        stream = Stream(history.last.event + 1)
+        gate, watch = await asyncio.to_thread(_open_gate, settings, close_later)
         telemetry = Telemetry()
         options = WorkersOptions(settings.workers, settings.workers_count)
         workers = await asyncio.to_thread(Workers, options, telemetry.took)
@@ -87,13 +99,14 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
         station = Station(_station_options(settings, workers.capacity))
         memory = await asyncio.to_thread(history.recall, settings.forget_after_s, settings.unknown_after_s)
         station.restore(memory, time.time_ns())
+        stream = Stream(memory.event + 1)
         loop = Loop(
             station,
             Inbox(mailboxes),
             workers,
             (publisher, history, stream),
             telemetry,
-            next_event=history.last.event + 1,
+            next_event=memory.event + 1,
         )
         task = asyncio.create_task(_run(loop), name="covista-loop")
         stack.push_async_callback(_end, task)
@@ -103,7 +116,7 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
 
         def health_now() -> Health:
             moving = {"workers": _crew_health(workers, settings.workers)}
-            moving |= {"store": history.health(), "loop": _loop_health(loop, task)}
+            moving |= {"store": history.health(), "loop": _loop_health(loop, task), "access": watch.health()}
             return _health({"link": link, **moving})
 
         def vitals_now() -> Vitals:
@@ -122,11 +135,22 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
             health_now,
             vitals_now,
             secrets.token_hex(4),
+            gate,
             archive=archive,
             flush=history.flush,
             stream=stream,
         )
         log.info("stops", extra=about(surveys=telemetry.summary().surveys))
+
+
+def _open_gate(settings: Settings, close_later: Callable[[Callable[[], object]], None]) -> tuple[Gate, TokenWatch]:
+    """Who may ask, by tokens that are read for as long as the station runs."""
+    tokens = Tokens(settings.database)
+    close_later(tokens.close)
+    keyring = Keyring(locked=not (settings.insecure or is_loopback(settings.api_address.host)))
+    watch = TokenWatch(tokens, keyring)
+    close_later(watch.close)
+    return Gate(keyring, news=watch.news, any_host=settings.insecure), watch
 
 
 async def _run(loop: Loop) -> None:

@@ -8,6 +8,7 @@ import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple, Self
+from urllib.parse import urlsplit
 
 from covista_schemas.errors import CovistaError, LinkError
 from covista_schemas.keys import ID_PATTERN
@@ -81,11 +82,24 @@ def _check_workers(text: str) -> str:
     return text
 
 
+def _check_origin(text: str) -> str:
+    try:
+        parts = urlsplit(text)
+        whole = parts.scheme in ("http", "https") and parts.hostname and text == f"{parts.scheme}://{parts.netloc}"
+        _ = parts.port
+    except ValueError:
+        whole = False
+    if not whole or "@" in text or "*" in text or text != text.lower():
+        raise ValueError(f"{text!r} is not the origin of a page, such as https://control.example:8443")
+    return text
+
+
 def _split(value: object) -> object:
     return [part.strip() for part in value.split(",") if part.strip()] if isinstance(value, str) else value
 
 
 Endpoints = Annotated[tuple[Annotated[str, AfterValidator(_check_endpoint)], ...], NoDecode, BeforeValidator(_split)]
+Origins = Annotated[tuple[Annotated[str, AfterValidator(_check_origin)], ...], NoDecode, BeforeValidator(_split)]
 Seconds = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False)]
 
 
@@ -129,6 +143,11 @@ class Settings(LiveSettings, BaseSettings):
         default=2, ge=1, le=256, description="How many surveys run at a time; of a cluster, while it is away."
     )
     insecure: bool = Field(default=False, description="Listen beyond loopback without access control.")
+    cors_origins: Origins = Field(
+        default=(), description="Origins whose pages may ask the REST interface in a browser, separated by commas."
+    )
+    tls_cert: Path | None = Field(default=None, description="PEM file with the REST interface's certificate and chain.")
+    tls_key: Path | None = Field(default=None, description="PEM file with the key of tls_cert, without a password.")
     log_level: Literal["debug", "info", "warning", "error"] = Field(default="info", description="Least level to log.")
     log_format: Literal["text", "json"] = Field(default="text", description="A line of words, or a JSON object.")
     log_lines_per_minute: int = Field(
@@ -161,6 +180,7 @@ class Settings(LiveSettings, BaseSettings):
         # What is asked of a database, or configures an end point, may hold a key.
         shown["database"] = make_url(self.database).set(query={}).render_as_string(hide_password=True)
         shown |= {name: ", ".join(each.split("#")[0] for each in getattr(self, name)) for name in ("link", "connect")}
+        shown["cors_origins"] = ", ".join(self.cors_origins)
         return shown
 
     @property
@@ -180,6 +200,9 @@ class Settings(LiveSettings, BaseSettings):
                 f"setting forget_after_s = {self.forget_after_s:g} must not be less than live_after_s + gone_after_s "
                 f"= {self.live_after_s + self.gone_after_s:g}"
             )
+        if (self.tls_cert is None) != (self.tls_key is None):
+            given, absent = ("tls_cert", "tls_key") if self.tls_key is None else ("tls_key", "tls_cert")
+            raise ValueError(f"setting {given} needs {absent}: TLS takes a certificate and its key")
         if not self.link and not self.connect:
             raise ValueError("setting link is empty, and so is connect: no robot could reach the station")
         return self

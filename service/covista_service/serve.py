@@ -17,6 +17,7 @@ from covista_schemas.errors import CovistaError
 from fastapi import FastAPI
 from starlette.types import Receive, Scope, Send
 
+from covista_service.access.certificates import Certificates
 from covista_service.api.connection import Connection
 from covista_service.api.deps import Parts
 from covista_service.app import create_app
@@ -25,6 +26,8 @@ from covista_service.telemetry import Summary
 
 # Answers under way get so long to be finished.
 _GRACE_S = 1
+# How often the certificate's files are looked at.
+_CERTIFICATE_S = 10.0
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -48,9 +51,10 @@ def run(settings: Settings, *, ready: Callable[[Running], None] | None = None, s
     In the main thread SIGINT and SIGTERM stop it too, unless `signals` is False.
     """
     app = create_app(settings)
+    certificates = _certificates(settings)
     listener = _bind(settings.api_address)
     try:
-        asyncio.run(_serve(app, settings, listener, ready, signals=signals))
+        asyncio.run(_serve(app, settings, listener, certificates, ready, signals=signals))
     finally:
         listener.close()
 
@@ -59,6 +63,7 @@ async def _serve(
     app: FastAPI,
     settings: Settings,
     listener: socket.socket,
+    certificates: Certificates | None,
     ready: Callable[[Running], None] | None,
     *,
     signals: bool,
@@ -81,11 +86,17 @@ async def _serve(
             lifespan="off",
             log_config=None,
             access_log=False,
+            ws="none",
+            # Whoever asks could write them: an address is that of the connection.
+            proxy_headers=False,
+            server_header=False,
+            ssl_context_factory=None if certificates is None else lambda _config, _usual: certificates.context,
             timeout_graceful_shutdown=_GRACE_S,
         )
     )
     # The lifespan is entered here and not by the server, so that what goes wrong comes out as an exception.
-    with _stopped_by(_SIGNALS if signals else (), server.stop):
+    heard = _SIGNALS if signals else ()
+    with _stopped_by(heard, server.stop), _renewed(certificates, signals=signals):
         async with app.router.lifespan_context(app) as state:
             if state is None:
                 raise StartError("the application has no parts")
@@ -135,6 +146,39 @@ def _stopped_by(signals: Sequence[signal.Signals], stop: Callable[[], None]) -> 
             loop.remove_signal_handler(number)
 
 
+def _certificates(settings: Settings) -> Certificates | None:
+    """The certificate to show, if there is to be TLS. Raises CertificateError."""
+    if settings.tls_cert is None or settings.tls_key is None:
+        return None
+    return Certificates(settings.tls_cert, settings.tls_key)
+
+
+@contextmanager
+def _renewed(certificates: Certificates | None, *, signals: bool) -> Iterator[None]:
+    """Have the certificate renewed when its files change, and at SIGHUP."""
+    if certificates is None:
+        yield
+        return
+    loop = asyncio.get_running_loop()
+    hears = signals and threading.current_thread() is threading.main_thread()
+    if hears:
+        loop.add_signal_handler(signal.SIGHUP, certificates.renew)
+    task = asyncio.create_task(_watch(certificates))
+    try:
+        yield
+    finally:
+        task.cancel()
+        if hears:
+            loop.remove_signal_handler(signal.SIGHUP)
+
+
+async def _watch(certificates: Certificates) -> None:
+    while True:
+        await asyncio.sleep(_CERTIFICATE_S)
+        if await asyncio.to_thread(certificates.is_changed):
+            certificates.renew()
+
+
 def _bind(address: Address) -> socket.socket:
     """A socket that listens at the API's address. Raises StartError."""
     change = "choose another with --api (COVISTA_API)"
@@ -157,7 +201,8 @@ def _bind(address: Address) -> socket.socket:
 
 def _url(settings: Settings, listener: socket.socket) -> str:
     host = settings.api_address.host
-    return f"http://{f'[{host}]' if ':' in host else host}:{listener.getsockname()[1]}"
+    scheme = "http" if settings.tls_cert is None else "https"
+    return f"{scheme}://{f'[{host}]' if ':' in host else host}:{listener.getsockname()[1]}"
 
 
 def _nothing() -> None:

@@ -167,6 +167,31 @@ def test_what_is_wrong_with_a_part_names_the_part(
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    "text", ["https://control.example", "http://localhost:3000", "https://10.0.0.1:8443", "http://[::1]:80"]
+)
+def test_origins_of_pages_are_named_in_full(text: str) -> None:
+    assert load({"cors_origins": f"{text}, https://other.example"}).cors_origins == (text, "https://other.example")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("*", "https://*.example", "control.example", "https://a.example/", "https://a.example/x", "ftp://a.example"),
+        *("https://", "https://u@a.example", "https://a.example:x", "https://A.example", "https://a.example?b", "null"),
+    ],
+)
+def test_what_is_no_origin_is_refused(text: str) -> None:
+    with pytest.raises(SettingsError, match=r"setting cors_origins \(COVISTA_CORS_ORIGINS\): .* is not the origin"):
+        load({"cors_origins": text})
+
+
+@pytest.mark.parametrize(("given", "absent"), [("tls_cert", "tls_key"), ("tls_key", "tls_cert")])
+def test_a_certificate_needs_its_key(given: str, absent: str) -> None:
+    with pytest.raises(SettingsError, match=f"setting {given} needs {absent}"):
+        load({given: "station.pem"})
+
+
 def test_settings_are_shown_without_what_is_secret() -> None:
     settings = load(
         {

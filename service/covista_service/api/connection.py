@@ -18,6 +18,7 @@ from uvicorn.server import ServerState
 
 from covista_service.api.delivery import CUT, SLOW
 from covista_service.api.errors import refuse
+from covista_service.api.headers import with_headers
 
 # What the system keeps unsent for a client: bounds what hundreds cost, and lets a slow one be seen to move.
 _SEND_BUFFER_BYTES = 128 * 1024
@@ -141,4 +142,4 @@ class Connection(H11Protocol):
                 Problem(title="Too many connections", status=503, instance=scope.get("path")),
                 {"retry-after": "10", "connection": "close"},
             )
-        await app(scope, receive, partial(self._note, send))
+        await with_headers(app)(scope, receive, partial(self._note, send))

@@ -12,6 +12,7 @@ from covista_schemas.keys import ID_PATTERN
 from covista_schemas.reports import Health, Report
 from fastapi import Depends, Path, Request, Response
 
+from covista_service.access import Gate
 from covista_service.answers.past import Archive
 from covista_service.api.delivery import deliver
 from covista_service.api.outgoing import Outgoing
@@ -30,7 +31,8 @@ JSON = "application/json"
 class Parts:
     """What the routes need of the station. `name` changes with each start, so that no answer is mistaken for newer.
 
-    `flush` waits so many seconds at most until what was told is in the history, and says whether it is.
+    `gate` says who may ask. `flush` waits so many seconds at most until what was told is in the history, and says
+    whether it is.
     """
 
     loop: Loop
@@ -38,6 +40,7 @@ class Parts:
     health: Callable[[], Health]
     vitals: Callable[[], Vitals]
     name: str
+    gate: Gate
     archive: Archive
     flush: Callable[[float], bool]
     stream: Stream

@@ -7,6 +7,7 @@ from fastapi import APIRouter, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 
 from covista_service.api import examples
+from covista_service.api.access_metrics import of_access
 from covista_service.api.deps import CensusNow, PartsNow, answer
 from covista_service.api.metrics import of_station
 from covista_service.api.outgoing_metrics import of_outgoing
@@ -32,4 +33,5 @@ def metrics(parts: PartsNow, census: CensusNow) -> Response:
     now = of_station(census, parts.vitals(), parts.health())
     text = generate_latest(parts.telemetry.registry) + generate_latest(now)
     text += generate_latest(of_outgoing(parts.outgoing, parts.stream))
+    text += generate_latest(of_access(parts.gate))
     return Response(text, media_type=CONTENT_TYPE_LATEST)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TypeVar
 
 import httpx
@@ -13,11 +14,16 @@ _R = TypeVar("_R", bound=Report)
 
 
 class Watch:
-    """A client of the station's REST interface; raises ApiError when it does not answer."""
+    """A client of the station's REST interface; raises ApiError when it does not answer.
+
+    A database that is given to the demo may hold tokens: one of them has to be in COVISTA_TOKEN then.
+    """
 
     def __init__(self, url: str) -> None:
         self._url = url
-        self._client = httpx.Client(base_url=f"{url}/api/v1", timeout=_TIMEOUT_S)
+        token = os.environ.get("COVISTA_TOKEN")
+        headers = {"authorization": f"Bearer {token}"} if token else {}
+        self._client = httpx.Client(base_url=f"{url}/api/v1", headers=headers, timeout=_TIMEOUT_S)
 
     def ready(self) -> bool:
         """Does the station say that it is ready? False where it does not answer in time, too."""

@@ -35,9 +35,8 @@ class Backlog:
         self._sampled: deque[Entry] = deque()
         self._loss: Loss | None = None
         self.lost = 0
-        # Told entries that came, and those that are written or lost.
-        self.told_came = 0
-        self.told_went = 0
+        # Told entries that came, those that are written or lost, and those that are lost.
+        self.told_came = self.told_went = self.told_lost = 0
 
     def __len__(self) -> int:
         return len(self._told) + len(self._sampled)
@@ -75,7 +74,9 @@ class Backlog:
             time_us = time_us_of(entry)
             self._loss = Loss(time_us, time_us, 1) if self._loss is None else self._loss.and_of(time_us)
             self.lost += 1
-            self.told_went += not isinstance(entry, Sampled)
+            told = not isinstance(entry, Sampled)
+            self.told_went += told
+            self.told_lost += told
 
     @property
     def loss(self) -> Loss | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sqlite3
 from pathlib import Path
 from typing import Any
 
@@ -75,16 +76,15 @@ def prepare_file(engine: Engine) -> None:
     file = file_of(engine.url)
     if file is None or not file.exists() or file.stat().st_size > _SMALL_BYTES:
         return
-    connection = engine.raw_connection()
-    try:
+    with engine.connect() as connection:
         # Outside transactions, which SQLAlchemy would begin.
-        cursor = connection.cursor()
-        if cursor.execute("PRAGMA auto_vacuum").fetchone()[0] == 0:
-            cursor.execute("PRAGMA auto_vacuum = INCREMENTAL")
-            cursor.execute("VACUUM")
-        cursor.close()
-    finally:
-        connection.close()
+        driver: Any = connection.connection.driver_connection
+        try:
+            if driver.execute("PRAGMA auto_vacuum").fetchone()[0] == 0:
+                driver.execute("PRAGMA auto_vacuum = INCREMENTAL")
+                driver.execute("VACUUM")
+        except sqlite3.Error as error:
+            raise DatabaseError(str(error)) from error
 
 
 def first_line(error: Exception) -> str:

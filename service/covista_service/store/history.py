@@ -54,7 +54,7 @@ class History:
         self._first_pause_s, self._period_s = first_pause_s, period_s
         self._changed = threading.Condition()
         self._closing = False
-        self._written = 0
+        self._written = self._known_lost = 0
         self._problem: str | None = None
         self._ask: Ask | None = None
         self._sampler = Sampler()
@@ -64,7 +64,7 @@ class History:
         self._busy_s: float | None = None
         self._pause_s = 0.0
         self._more = False
-        self.last = self._start()
+        self.last = self._used = self._start()
         self._thread = threading.Thread(target=self._run, name="covista-history", daemon=True)
         self._thread.start()
 
@@ -91,16 +91,23 @@ class History:
             entries.append(answers.groups_report(news.snapshot))
         if news.settings is not None and news.patch:
             entries.append(SettingsChange(time_of(news.snapshot.wall_ns), _by(news), news.patch, news.settings))
+        groups = news.snapshot.groups
+        event = max((each.id for each in news.events), default=0)
         with self._changed:
+            self._used = self._used.over(LastNumbers(groups.revision, event, groups.last_label))
             self._backlog.tell(entries)
             self._changed.notify_all()
 
     def flush(self, timeout_s: float) -> bool:
-        """Wait until all that was taken so far is written; False if it is not, or some of it never will be."""
+        """Wait until all that was taken so far is written; False if it is not.
+
+        Also if some of what was taken since the last time that somebody waited never will be.
+        """
         with self._changed:
-            came, lost = self._backlog.told_came, self._backlog.lost
-            done = self._changed.wait_for(lambda: self._closing or self._backlog.told_went >= came, timeout_s)
-            return done and self._backlog.told_went >= came and self._backlog.lost == lost
+            came = self._backlog.told_came
+            self._changed.wait_for(lambda: self._closing or self._backlog.told_went >= came, timeout_s)
+            before, self._known_lost = self._known_lost, self._backlog.told_lost
+            return self._backlog.told_went >= came and self._known_lost == before
 
     def recall(self, forget_after_s: float, unknown_after_s: float) -> Memory:
         """What the station before this one knew, as far as it is young enough; all there is where it can be read.
@@ -226,11 +233,11 @@ class History:
         with self._changed:
             batch, loss = self._backlog.take(self._batch), self._backlog.loss
             reason = self._problem or "entries came faster than they could be written"
-            self._busy_s = time.monotonic()
+            self._busy_s, used = time.monotonic(), self._used
         if not batch and loss is None and self._problem is None:
             return False
         try:
-            self._writer.write(batch, loss, reason)
+            self._writer.write(batch, loss, reason, used)
         except Exception as error:
             self._put_back(batch, error)
             if is_passing(error):

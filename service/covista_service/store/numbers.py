@@ -10,7 +10,6 @@ import json
 from collections.abc import Iterable
 from dataclasses import astuple, dataclass, fields
 
-from covista_schemas.reports import EventReport, GroupsReport
 from sqlalchemy import Connection, Table, func, insert, select, update
 
 from covista_service.store.tables import events, group_revisions, numbers
@@ -30,14 +29,6 @@ class LastNumbers:
     def over(self, other: LastNumbers) -> LastNumbers:
         """The higher of each."""
         return LastNumbers(*map(max, astuple(self), astuple(other)))
-
-    def of_entry(self, entry: object) -> LastNumbers:
-        """With those that an entry of the history names."""
-        if isinstance(entry, GroupsReport):
-            return self.over(LastNumbers(revision=entry.revision, label=_label(each.label for each in entry.groups)))
-        if isinstance(entry, EventReport):
-            return self.over(LastNumbers(event=entry.id, label=_label(entry.labels)))
-        return self
 
 
 BLOCK = LastNumbers(revision=1000, event=10_000, label=1000)

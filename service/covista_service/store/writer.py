@@ -21,7 +21,7 @@ from covista_service.store.numbers import LastNumbers, ahead, last_used, reserve
 from covista_service.store.present import Present
 from covista_service.store.recollection import recollect
 from covista_service.store.retention import Retention, drop_older, drop_superseded, patch_of
-from covista_service.store.rows import Entry, SettingsChange, write
+from covista_service.store.rows import Entry, SettingsChange, time_us_of, write
 from covista_service.store.size import size_of
 from covista_service.store.tables import events, gaps, group_revisions, settings_changes
 from covista_service.telemetry import about
@@ -65,12 +65,10 @@ class Writer:
         with self._opening():
             pass
 
-    def write(self, batch: Sequence[Entry], loss: Loss | None, reason: str) -> None:
-        """Append entries, and a gap for what is missing before them."""
+    def write(self, batch: Sequence[Entry], loss: Loss | None, reason: str, used: LastNumbers) -> None:
+        """Append entries, and a gap for what is missing; numbers up to `used` are."""
         self._reopen()
-        used = self._used
-        for entry in batch:
-            used = used.of_entry(entry)
+        used = used.over(self._used)
         reserved = ahead(self._reserved, used)
         with self._engine.begin() as connection:
             write(connection, batch)
@@ -83,8 +81,8 @@ class Writer:
             if isinstance(entry, SettingsChange):
                 self._patch |= entry.patch
                 self._settings = entry.settings
-        if self._begun_us is None:
-            self._begun_us = self._clock() // 1000
+        if self._begun_us is None and batch:
+            self._begun_us = min(map(time_us_of, batch))
 
     def remember(self, snapshot: Snapshot) -> None:
         """Keep the state of robots and pairs for a station that starts."""

@@ -7,6 +7,7 @@ from typing import Any
 import httpx
 import pytest
 from covista_schemas.reports import Health, PartHealth
+from covista_service.access import Gate, Keyring
 from covista_service.api import rest
 from covista_service.api.deps import Parts
 from covista_service.api.stream import Stream
@@ -31,6 +32,13 @@ class Silence:
         return (), None
 
 
+def open_gate(*, any_host: bool) -> Gate:
+    """A gate of a station without tokens."""
+    keyring = Keyring()
+    keyring.take([])
+    return Gate(keyring, any_host=any_host)
+
+
 @dataclass
 class Desk:
     """The REST interface of a scene's station, without a network."""
@@ -49,10 +57,9 @@ class Desk:
     )
     health: Health = field(default_factory=lambda: Health(status="ready", parts={"link": PartHealth(status="ready")}))
 
-    # Name of the token that is asked with.
-    by: str | None = None
     # Nobody keeps a history there.
     database: str = "sqlite:////nowhere/covista.db"
+    gate: Gate = field(default_factory=lambda: open_gate(any_host=True))
 
     def __post_init__(self) -> None:
         self.app = rest.build()
@@ -65,6 +72,7 @@ class Desk:
             lambda: self.health,
             lambda: self.vitals,
             "test",
+            self.gate,
             archive=self.archive,
             flush=lambda _: True,
             stream=Stream(),
@@ -72,8 +80,6 @@ class Desk:
 
     async def _stateful(self, scope: dict[str, Any], receive: Any, send: Any) -> None:
         scope["state"] = {"parts": self.parts}
-        if self.by is not None:
-            scope["covista.by"] = self.by
         await self.app(scope, receive, send)
 
     def ask(self, path: str, method: str = "GET", content: str | None = None, **headers: str) -> httpx.Response:

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import psutil
 import psycopg
 import pytest
 from psycopg import sql
@@ -76,11 +77,17 @@ class Server:
     @contextmanager
     def frozen(self) -> Iterator[None]:
         """Nobody of it does anything, but its connections stand."""
-        os.killpg(self._process.pid, signal.SIGSTOP)
+        # The postmaster first, so that it begins nothing more.
+        postmaster = psutil.Process(self._process.pid)
+        postmaster.suspend()
+        stopped = [postmaster, *postmaster.children(recursive=True)]
+        for each in stopped[1:]:
+            each.suspend()
         try:
             yield
         finally:
-            os.killpg(self._process.pid, signal.SIGCONT)
+            for each in reversed(stopped):
+                each.resume()
 
     def new_database(self) -> str:
         """The URL of an empty database."""

@@ -30,7 +30,23 @@ def test_an_end_point_is_local_by_its_address(endpoint: str, local: bool) -> Non
 
 
 def test_only_the_operator_opens_the_station_to_the_network() -> None:
-    with pytest.raises(AccessError, match=r"api = 0\.0\.0\.0 and link = tcp/0\.0\.0\.0:1 .* insecure \(--insecure"):
+    with pytest.raises(AccessError, match=r"api = 0\.0\.0\.0 .* and link = tcp/0\.0\.0\.0:1 .* insecure \(--insecure"):
         check_listening("0.0.0.0", ["tcp/127.0.0.1:7447", "tcp/0.0.0.0:1"], insecure=False)
     check_listening("0.0.0.0", ["tcp/0.0.0.0:1"], insecure=True)
     check_listening("127.0.0.1", ["tcp/127.0.0.1:7447"], insecure=False)
+
+
+def test_a_token_opens_the_api_to_the_network_and_not_the_link() -> None:
+    check_listening("0.0.0.0", ["tcp/127.0.0.1:1"], insecure=False, has_tokens=lambda: True)
+    with pytest.raises(AccessError) as caught:
+        check_listening("0.0.0.0", ["tcp/0.0.0.0:1"], insecure=False, has_tokens=lambda: True)
+    assert "api" not in str(caught.value)
+    assert "zenoh has no access control" in str(caught.value)
+
+
+def test_whether_there_are_tokens_is_asked_only_where_it_matters() -> None:
+    def unreadable() -> bool:
+        raise AssertionError("asked")
+
+    check_listening("127.0.0.1", [], insecure=False, has_tokens=unreadable)
+    check_listening("0.0.0.0", [], insecure=True, has_tokens=unreadable)

@@ -1,0 +1,81 @@
+"""The station's certificate: read from two files, and read again when they change, while connections go on."""
+
+from __future__ import annotations
+
+import logging
+import ssl
+from pathlib import Path
+
+from covista_schemas.errors import CovistaError
+
+log = logging.getLogger(__name__)
+
+
+class CertificateError(CovistaError):
+    """The station cannot prove who it is; the text is one line that says what to change."""
+
+
+class Certificates:
+    """A certificate (PEM, with what stands between it and the root) and its key. Raises CertificateError."""
+
+    def __init__(self, cert: Path, key: Path) -> None:
+        self._cert = cert
+        self._key = key
+        self._seen = self._stamp()
+        # New connections take up what is loaded into it later.
+        self.context = _load(cert, key)
+
+    def is_changed(self) -> bool:
+        """Whether the files are others than those looked at last."""
+        return self._stamp() != self._seen
+
+    def renew(self) -> bool:
+        """Take up what is in the files now; what cannot be used is left alone, and the certificate stays as it was."""
+        self._seen = self._stamp()
+        try:
+            # On trial first: a certificate whose key is not there yet would be half loaded.
+            _load(self._cert, self._key)
+            _load(self._cert, self._key, self.context)
+        except CertificateError as error:
+            log.warning("the certificate stays as it was: %s", error)
+            return False
+        log.info("the certificate is renewed")
+        return True
+
+    def _stamp(self) -> tuple[tuple[int, int, int], ...]:
+        return tuple(_stamp_of(path) for path in (self._cert, self._key))
+
+
+def _stamp_of(path: Path) -> tuple[int, int, int]:
+    try:
+        found = path.stat()
+    except OSError:
+        return (0, 0, 0)
+    return (found.st_ino, found.st_size, found.st_mtime_ns)
+
+
+def _load(cert: Path, key: Path, context: ssl.SSLContext | None = None) -> ssl.SSLContext:
+    """A context with this certificate, of TLS 1.2 or newer. Raises CertificateError."""
+    for name, path in (("tls_cert", cert), ("tls_key", key)):
+        try:
+            path.read_bytes()
+        except OSError as error:
+            raise CertificateError(f"setting {name}: {path} cannot be read: {error.strerror}") from error
+    if context is None:
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        context.minimum_version = ssl.TLSVersion.TLSv1_2
+        context.set_alpn_protocols(["http/1.1"])
+    try:
+        context.load_cert_chain(cert, key, _no_password)
+    except (ssl.SSLError, OSError, ValueError) as error:
+        said = getattr(error, "reason", None) or str(error)
+        raise CertificateError(
+            f"settings tls_cert and tls_key: {cert} and {key} are not a certificate and its key, both PEM and the key "
+            f"without a password ({said})"
+        ) from error
+    return context
+
+
+def _no_password() -> str:
+    """Without this OpenSSL asks on the terminal, and waits."""
+    return ""

@@ -1,0 +1,57 @@
+"""Where the station may listen: beyond this machine only with access control, unless the operator says otherwise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from ipaddress import ip_address
+
+from covista_schemas.errors import CovistaError
+
+_LOCAL_PROTOCOLS = ("unixsock-stream", "unixpipe")
+
+
+class AccessError(CovistaError):
+    """The station would be open to everybody on the network."""
+
+
+def check_listening(
+    api_host: str, endpoints: Sequence[str], *, insecure: bool, has_tokens: Callable[[], bool] = lambda: False
+) -> None:
+    """Refuse to listen beyond loopback without access control, unless `insecure`. Raises AccessError.
+
+    The API has it where there are tokens; `has_tokens` is asked only where that matters. The zenoh link has none yet.
+    """
+    if insecure:
+        return
+    beyond = [endpoint for endpoint in endpoints if not is_local(endpoint)]
+    reasons = []
+    if not is_loopback(api_host) and not has_tokens():
+        reasons.append(
+            f"api = {api_host} would be open to the network, for there is no token yet (covista-station token add NAME)"
+        )
+    if beyond:
+        reasons.append(f"link = {', '.join(beyond)} would be open to the network, for zenoh has no access control yet")
+    if reasons:
+        raise AccessError(
+            f"{' and '.join(reasons)}; choose a loopback address, or set insecure (--insecure, COVISTA_INSECURE=true)"
+        )
+
+
+def is_loopback(host: str) -> bool:
+    """Whether `host` is this machine only; names other than localhost are not resolved, hence not trusted."""
+    if host == "localhost":
+        return True
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def is_local(endpoint: str) -> bool:
+    """Whether a zenoh end point, such as tcp/127.0.0.1:7447, is reached from this machine only."""
+    protocol, _, rest = endpoint.partition("/")
+    if protocol in _LOCAL_PROTOCOLS:
+        return True
+    # What follows ? and # are metadata and options of the end point.
+    address = rest.split("?")[0].split("#")[0]
+    return is_loopback(address.rpartition(":")[0].strip("[]"))

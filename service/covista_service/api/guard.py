@@ -1,0 +1,157 @@
+"""Lets requests in by their token, and says in HTTP why one stays out.
+
+Closed unless named here: a route that is added needs a token without anybody thinking of it. What is open tells nothing
+of the robots: who restarts the station, or sends it work, asks `/healthz` and `/readyz` and keeps no secrets, and the
+description is the same for every station.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from http import HTTPStatus
+from ipaddress import ip_address
+from typing import Any
+
+from covista_schemas.reports import Problem
+from fastapi import Response
+from starlette.datastructures import Headers
+from starlette.types import ASGIApp, Message, Receive, Send
+from starlette.types import Scope as Request
+
+from covista_service.access import Admitted, Gate, Refusal, Refused, Scope, is_loopback
+from covista_service.api.delivery import CUT
+from covista_service.api.deps import State
+from covista_service.api.errors import refuse
+from covista_service.api.timing import PREFIX
+
+# In the scope of a request: the name of the token that it came with, or None.
+BY = "covista.by"
+OPEN = frozenset({"/healthz", "/readyz", "/docs", "/docs/oauth2-redirect", "/openapi.json"})
+_ASKS = frozenset({"GET", "HEAD", "OPTIONS"})
+# Computes, and changes nothing.
+_ASKS_BY_POST = frozenset({f"{PREFIX}/groups/preview"})
+_REALM = 'Bearer realm="covista"'
+
+_WHY: dict[Refusal, tuple[HTTPStatus, str, str]] = {
+    Refusal.MISSING: (HTTPStatus.UNAUTHORIZED, "a token is needed: Authorization: Bearer covista_...", ""),
+    Refusal.MALFORMED: (
+        HTTPStatus.UNAUTHORIZED,
+        "one header is expected: Authorization: Bearer covista_...",
+        'error="invalid_request"',
+    ),
+    Refusal.UNKNOWN: (HTTPStatus.UNAUTHORIZED, "this token is not known", 'error="invalid_token"'),
+    Refusal.REVOKED: (HTTPStatus.UNAUTHORIZED, "this token is revoked", 'error="invalid_token"'),
+    Refusal.SCOPE: (HTTPStatus.FORBIDDEN, "this needs a token of scope {wanted}", 'error="insufficient_scope"'),
+    Refusal.LIMITED: (HTTPStatus.TOO_MANY_REQUESTS, "too many requests without a token that is good", ""),
+    Refusal.UNREAD: (HTTPStatus.SERVICE_UNAVAILABLE, "the tokens cannot be read; nobody is let in before", ""),
+    Refusal.HOST: (
+        HTTPStatus.FORBIDDEN,
+        "without tokens the station answers only to localhost and to addresses, not to other names for them",
+        "",
+    ),
+}
+# Until the tokens are read, which is tried every second.
+_UNREAD_RETRY_S = 2
+
+
+def wanted_scope(method: str, path: str) -> Scope | None:
+    """What a request needs; None where it is open. Paths are those of requests or templates of routes."""
+    if path in OPEN:
+        return None
+    return Scope.READ if method in _ASKS or (method == "POST" and path in _ASKS_BY_POST) else Scope.OPERATE
+
+
+def guarded(app: ASGIApp) -> ASGIApp:
+    """Lets in only what the gate of the station admits, and notes by whom it was asked."""
+
+    async def answer(scope: Request, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            # There are no websockets, and none may come past the gate.
+            await (_hang_up(send) if scope["type"] == "websocket" else app(scope, receive, send))
+            return
+        wanted = wanted_scope(scope["method"], scope["path"])
+        found = Admitted() if wanted is None else await _judge(scope, wanted)
+        if isinstance(found, Refused):
+            await _refusal(found, scope["path"], wanted)(scope, receive, send)
+            return
+        scope[BY] = found.by
+        await app(scope, receive, send if wanted is None else _while_let_in(scope, found.by, send))
+
+    return answer
+
+
+def _while_let_in(scope: Request, by: str | None, send: Send) -> Send:
+    """Sends until the token is revoked: a stream of events would outlive it by days."""
+    keyring = _gate_of(scope).keyring
+    over = False
+
+    async def sending(message: Message) -> None:
+        nonlocal over
+        if over:
+            return
+        if message["type"] == "http.response.body" and not keyring.lets_in(by):
+            over = True
+            await _cut(scope, send)
+            return
+        await send(message)
+
+    return sending
+
+
+async def _cut(scope: Request, send: Send) -> None:
+    """End an answer short, so that nobody takes it for whole."""
+    extensions: dict[str, Any] = scope.get("extensions") or {}
+    if CUT in extensions:
+        extensions[CUT]()
+        # The server must hear that the connection is gone before the answer ends.
+        await asyncio.sleep(0)
+    else:
+        await send({"type": "http.response.body", "body": b"", "more_body": False})
+
+
+def _gate_of(scope: Request) -> Gate:
+    state: State = scope["state"]
+    return state["parts"].gate
+
+
+async def _hang_up(send: Send) -> None:
+    await send({"type": "websocket.close", "code": 1008})
+
+
+async def _judge(scope: Request, wanted: Scope) -> Admitted | Refused:
+    gate = _gate_of(scope)
+    headers = Headers(scope=scope)
+    address = str((scope.get("client") or ("",))[0])
+    found = await gate.admit(headers.getlist("authorization"), wanted, address)
+    if found == Admitted() and not _may_be_called(gate, headers.get("host", "")):
+        return gate.refuse(Refusal.HOST, address)
+    return found
+
+
+def _may_be_called(gate: Gate, host: str) -> bool:
+    """Where no token is needed, a page of somebody else could give its own name this address and ask in the browser."""
+    if gate.any_host:
+        return True
+    name = host.rpartition(":")[0] if host.rpartition(":")[2].isdigit() and not host.endswith("]") else host
+    return is_loopback(name.strip("[]")) or _is_address(name.strip("[]"))
+
+
+def _is_address(host: str) -> bool:
+    try:
+        ip_address(host)
+    except ValueError:
+        return False
+    return True
+
+
+def _refusal(refused: Refused, path: str, wanted: Scope | None) -> Response:
+    status, detail, error = _WHY[refused.reason]
+    headers: dict[str, str] = {}
+    if status in (HTTPStatus.UNAUTHORIZED, HTTPStatus.FORBIDDEN) and refused.reason is not Refusal.HOST:
+        needs = f'scope="{wanted}"'
+        headers["www-authenticate"] = ", ".join(part for part in (_REALM, error, needs) if part)
+    retry_after_s = _UNREAD_RETRY_S if refused.reason is Refusal.UNREAD else refused.retry_after_s
+    if retry_after_s:
+        headers["retry-after"] = str(retry_after_s)
+    problem = Problem(title=status.phrase, status=status, detail=detail.format(wanted=wanted), instance=path)
+    return refuse(problem, headers)

@@ -1,0 +1,46 @@
+"""What every answer says to browsers: run nothing of it, show it in no frame, keep no copy."""
+
+from __future__ import annotations
+
+from starlette.datastructures import MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+_ALWAYS = {
+    "x-content-type-options": "nosniff",
+    "x-frame-options": "DENY",
+    "referrer-policy": "no-referrer",
+    "cross-origin-resource-policy": "same-origin",
+}
+_CONTENT = "default-src 'none'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
+# The page of FastAPI has a script of its own, and takes Swagger UI from where that is published.
+_DOCS = (
+    "default-src 'none'; script-src 'unsafe-inline' https://cdn.jsdelivr.net; style-src 'unsafe-inline' "
+    "https://cdn.jsdelivr.net; img-src 'self' data: https://fastapi.tiangolo.com; connect-src 'self'; "
+    "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
+)
+_DOCS_PATHS = ("/docs", "/docs/oauth2-redirect")
+_A_YEAR = "max-age=31536000"
+
+
+def with_headers(app: ASGIApp) -> ASGIApp:
+    """Adds them to every answer, errors too; what a route says itself stands."""
+
+    async def answer(scope: Scope, receive: Receive, send: Send) -> None:
+        async def sending(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                _complete(MutableHeaders(scope=message), scope)
+            await send(message)
+
+        await app(scope, receive, sending)
+
+    return answer
+
+
+def _complete(headers: MutableHeaders, scope: Scope) -> None:
+    for name, value in _ALWAYS.items():
+        headers.setdefault(name, value)
+    headers.setdefault("content-security-policy", _DOCS if scope["path"] in _DOCS_PATHS else _CONTENT)
+    # What has a version may be kept by who asked, to be asked for again; all else is stale at once, and not for others.
+    headers.setdefault("cache-control", "private, no-cache" if "etag" in headers else "no-store")
+    if scope["scheme"] == "https":
+        headers.setdefault("strict-transport-security", _A_YEAR)
