@@ -2,7 +2,9 @@ from typing import Any
 
 import pytest
 from covista_schemas import reports
+from covista_service.access import Gate, Keyring, Scope
 
+from tests.service.access.sources import Shelf
 from tests.service.api.conftest import Desk
 
 
@@ -131,3 +133,18 @@ def test_no_parameter_may_be_null(description: dict[str, Any]) -> None:
     for path in description["paths"].values():
         for operation in path.values():
             assert "null" not in str([each["schema"] for each in operation.get("parameters", [])])
+
+
+def test_a_station_without_tokens_says_that_none_is_needed_and_one_with_tokens_that_one_is() -> None:
+    shelf, keyring = Shelf(), Keyring()
+    desk = Desk(gate=Gate(keyring, any_host=True))
+    keyring.take([])
+
+    def wanted() -> list[dict[str, list[str]]]:
+        paths = desk.ask("/openapi.json").json()["paths"]
+        return list(paths["/api/v1/settings"]["patch"]["security"])
+
+    assert wanted() == [{}, {"token": ["operate"]}]
+    shelf.add("ada", Scope.OPERATE)
+    keyring.take(shelf.read())
+    assert wanted() == [{"token": ["operate"]}]
