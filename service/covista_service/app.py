@@ -90,9 +90,8 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
         retention = Retention(settings.retention_days, settings.retention_mb)
         history = await asyncio.to_thread(lambda: History(settings.database, retention=retention))
         close_later(history.close)
-        gate, watch = await asyncio.to_thread(_open_gate, settings, close_later)
         settings = with_stored(settings, history.stored_settings())
-        stream = Stream(history.last.event + 1)
+        gate, watch = await asyncio.to_thread(_open_gate, settings, close_later)
         telemetry = Telemetry()
         options = WorkersOptions(settings.workers, settings.workers_count)
         workers = await asyncio.to_thread(Workers, options, telemetry.took)
@@ -100,6 +99,7 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
         station = Station(_station_options(settings, workers.capacity))
         memory = await asyncio.to_thread(history.recall, settings.forget_after_s, settings.unknown_after_s)
         station.restore(memory, time.time_ns())
+        stream = Stream(memory.event + 1)
         loop = Loop(
             station,
             Inbox(mailboxes),

@@ -54,6 +54,18 @@ def describe(app: FastAPI) -> Callable[[], Description]:
     return openapi
 
 
+def without_tokens(description: Description) -> Description:
+    """The description of a station that nobody needs a token for: one may be sent along."""
+    paths = {
+        path: {
+            method: {**operation, "security": [{}, *operation["security"]] if operation["security"] else []}
+            for method, operation in operations.items()
+        }
+        for path, operations in description["paths"].items()
+    }
+    return {**description, "paths": paths}
+
+
 def _corrected(description: Description) -> Description:
     for path in description["paths"].values():
         for operation in path.values():

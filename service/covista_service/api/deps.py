@@ -32,8 +32,8 @@ JSON = "application/json"
 class Parts:
     """What the routes need of the station. `name` changes with each start, so that no answer is mistaken for newer.
 
-    `gate` says who may ask.
-    `flush` waits so many seconds at most until what was told is in the history, and says whether it is.
+    `gate` says who may ask. `flush` waits so many seconds at most until what was told is in the history, and says
+    whether it is.
     """
 
     loop: Loop

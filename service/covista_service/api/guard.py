@@ -2,7 +2,7 @@
 
 Closed unless named here: a route that is added needs a token without anybody thinking of it. What is open tells nothing
 of the robots: who restarts the station, or sends it work, asks `/healthz` and `/readyz` and keeps no secrets, and the
-description is the same for every station.
+description is the same for every station, but for whether it asks for tokens.
 """
 
 from __future__ import annotations

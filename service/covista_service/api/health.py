@@ -32,5 +32,6 @@ def metrics(parts: PartsNow, census: CensusNow) -> Response:
     """Counts and latencies for Prometheus."""
     now = of_station(census, parts.vitals(), parts.health())
     text = generate_latest(parts.telemetry.registry) + generate_latest(now)
-    text += generate_latest(of_outgoing(parts.outgoing, parts.stream)) + generate_latest(of_access(parts.gate))
+    text += generate_latest(of_outgoing(parts.outgoing, parts.stream))
+    text += generate_latest(of_access(parts.gate))
     return Response(text, media_type=CONTENT_TYPE_LATEST)

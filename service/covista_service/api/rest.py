@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from importlib.metadata import version
 
-from fastapi import APIRouter, FastAPI
+from fastapi import APIRouter, FastAPI, Response
+from fastapi.responses import JSONResponse
 from starlette.middleware.cors import CORSMiddleware
 from starlette.types import ASGIApp, Lifespan, Receive, Scope, Send
 
+from covista_service.access import Door
 from covista_service.api import contract, errors, events, groups, health, pairs, robots, settings, similarity
 from covista_service.api.bodies import bounded
+from covista_service.api.deps import PartsNow
 from covista_service.api.guard import guarded
 from covista_service.api.listening import HEAD_ONLY
 from covista_service.api.timing import PREFIX, timed
@@ -51,7 +54,18 @@ def build(lifespan: Lifespan[FastAPI] | None = None, cors_origins: Sequence[str]
     app.add_middleware(_head_as_get)
     # FastAPI's way to replace its own description is to assign the method.
     setattr(app, "openapi", contract.describe(app))  # noqa: B010 - mypy refuses the plain assignment
+    _serve_description(app)
     return app
+
+
+def _serve_description(app: FastAPI) -> None:
+    """In the place of the framework's own, which cannot say whether this station asks for tokens."""
+    app.router.routes[:] = [route for route in app.router.routes if getattr(route, "path", "") != app.openapi_url]
+
+    @app.get(str(app.openapi_url), include_in_schema=False)
+    async def description(parts: PartsNow) -> Response:
+        told = app.openapi()
+        return JSONResponse(contract.without_tokens(told) if parts.gate.keyring.door is Door.OPEN else told)
 
 
 def _head_as_get(app: ASGIApp) -> ASGIApp:

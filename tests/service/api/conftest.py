@@ -1,14 +1,13 @@
 import asyncio
 import json
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import httpx
 import pytest
 from covista_schemas.reports import Health, PartHealth
 from covista_service.access import Gate, Keyring
-from covista_service.access import Scope as AccessScope
 from covista_service.api import rest
 from covista_service.api.deps import Parts
 from covista_service.api.stream import Stream
@@ -19,7 +18,6 @@ from covista_service.station.events import Event
 from covista_service.store.archive import Archive
 from covista_service.telemetry import Telemetry
 
-from tests.service.access.sources import Shelf
 from tests.service.hands import Hands
 from tests.service.station.scenes import Scene
 
@@ -59,11 +57,9 @@ class Desk:
     )
     health: Health = field(default_factory=lambda: Health(status="ready", parts={"link": PartHealth(status="ready")}))
 
-    gate: Gate = field(default_factory=lambda: open_gate(any_host=True))
-    # Name of the token that is asked with.
-    by: str | None = None
     # Nobody keeps a history there.
     database: str = "sqlite:////nowhere/covista.db"
+    gate: Gate = field(default_factory=lambda: open_gate(any_host=True))
 
     def __post_init__(self) -> None:
         self.app = rest.build()
@@ -83,14 +79,7 @@ class Desk:
         )
 
     async def _stateful(self, scope: dict[str, Any], receive: Any, send: Any) -> None:
-        parts = self.parts
-        if self.by is not None:
-            shelf, keyring = Shelf(), Keyring()
-            token = shelf.add(self.by, AccessScope.OPERATE)
-            keyring.take(shelf.read())
-            parts = replace(parts, gate=Gate(keyring))
-            scope["headers"] = [*scope["headers"], (b"authorization", f"Bearer {token}".encode())]
-        scope["state"] = {"parts": parts}
+        scope["state"] = {"parts": self.parts}
         await self.app(scope, receive, send)
 
     def ask(self, path: str, method: str = "GET", content: str | None = None, **headers: str) -> httpx.Response:

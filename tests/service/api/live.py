@@ -20,12 +20,15 @@ from covista_service.api.deps import Parts
 from covista_service.api.stream import Stream
 from covista_service.loop import News
 from covista_service.store.history import History
+from covista_service.store.retention import Retention
 
 from tests.service.api.conftest import Desk
 from tests.service.deadline import wait_until
 
 _T = TypeVar("_T")
 DEADLINE_S = 10.0
+# Scenes play years ago.
+FOR_EVER = Retention(days=36_500)
 
 
 @dataclass
@@ -88,7 +91,7 @@ def site(folder: Path, stream: Stream | None = None, patience: Patience | None =
     desk.scene.send("r1")
     desk.scene.send("r2")
     desk.scene.settle()
-    with closing(History(database)) as history, closing(desk.archive):
+    with closing(History(database, retention=FOR_EVER)) as history, closing(desk.archive):
         desk.parts = replace(desk.parts, stream=stream or Stream())
         desk.parts.loop._sinks = (history, desk.parts.stream)
         made = partial(

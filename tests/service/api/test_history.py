@@ -22,7 +22,7 @@ from covista_service.loop import News
 from covista_service.store.history import History
 
 from tests.service.api.conftest import Desk
-from tests.service.api.live import event, news_of
+from tests.service.api.live import FOR_EVER, event, news_of
 from tests.service.deadline import wait_until
 
 HISTORIES = ["/groups/history", "/events/history", "/pairs/r1/r2/history", "/robots/r1/track"]
@@ -34,7 +34,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Desk]:
     """Groups of two robots, then of three; twelve events; and what the history notes of robots and pairs."""
     folder: Path = tmp_path_factory.mktemp("history")
     desk = Desk(database=f"sqlite:///{folder / 'covista.db'}")
-    with closing(History(desk.database, period_s=0.05)) as history, closing(desk.archive):
+    with closing(History(desk.database, retention=FOR_EVER, period_s=0.05)) as history, closing(desk.archive):
         for robot in ("r1", "r2", "r3"):
             desk.scene.send(robot)
             desk.scene.settle()

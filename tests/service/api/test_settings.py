@@ -4,8 +4,11 @@ from pathlib import Path
 
 import pytest
 from covista_schemas.reports import EventKind, GroupsReport, Hysteresis, LiveSettings, Problem
+from covista_service import answers
+from covista_service.access import Gate, Keyring, Scope
 from covista_service.loop import News
 
+from tests.service.access.sources import Shelf
 from tests.service.api.conftest import Desk
 from tests.service.api.live import Ear, site
 
@@ -19,8 +22,16 @@ class Notebook:
 
 
 @pytest.fixture
-def desk() -> Desk:
-    desk = Desk()
+def shelf() -> Shelf:
+    """Where there are no tokens, everybody may change settings."""
+    return Shelf()
+
+
+@pytest.fixture
+def desk(shelf: Shelf) -> Desk:
+    keyring = Keyring()
+    keyring.take(shelf.read())
+    desk = Desk(gate=Gate(keyring, any_host=True))
     for number in range(4):
         desk.scene.send(f"r{number}")
     desk.scene.settle()
@@ -59,15 +70,19 @@ def test_a_patch_takes_effect_before_it_is_answered(desk: Desk) -> None:
     assert groups.settings.groups == 2
 
 
-def test_a_patch_is_an_event_with_who_and_what_and_the_history_is_told(desk: Desk, notebook: Notebook) -> None:
-    desk.by = "ada"
-    desk.send("PATCH", "/settings", {"groups": {"min": 1, "max": 3}, "hysteresis": {"gain": 0.2}})
+def test_a_patch_is_an_event_with_who_and_what_and_the_history_is_told(
+    desk: Desk, notebook: Notebook, shelf: Shelf
+) -> None:
+    token = shelf.add("ada", Scope.OPERATE)
+    desk.gate.keyring.take(shelf.read())
+    patch = {"groups": {"min": 1, "max": 3}, "hysteresis": {"gain": 0.2}}
+    assert desk.send("PATCH", "/settings", patch, authorization=f"Bearer {token}").status_code == 200
     (news,) = (each for each in notebook.news if each.settings is not None)
     (event,) = (each for each in news.events if each.event is EventKind.SETTINGS)
     assert (event.by, event.text) == ("ada", "groups is 1 to 3, was auto; hysteresis.gain is 0.2, was 0.05")
     assert news.patch == {"groups": {"min": 1, "max": 3}, "hysteresis.gain": 0.2}
     assert json.loads(json.dumps(news.patch)) == news.patch
-    assert news.settings == LiveSettings.model_validate(desk.get("/settings").json())
+    assert news.settings == answers.live_settings(desk.scene.snapshot.groups.settings)
 
 
 def test_an_empty_patch_changes_nothing_and_is_no_event(desk: Desk, notebook: Notebook) -> None:
@@ -200,12 +215,13 @@ def test_a_preview_of_nothing_else_is_what_stands(desk: Desk) -> None:
     assert desk.send("POST", "/groups/preview", {}).json()["groups"] == desk.get("/groups").json()["groups"]
 
 
-def test_a_robot_is_forgotten_with_who_wanted_it(desk: Desk, notebook: Notebook) -> None:
-    desk.by = "ada"
-    response = desk.ask("/api/v1/robots/r1", "DELETE")
+def test_a_robot_is_forgotten_with_who_wanted_it(desk: Desk, notebook: Notebook, shelf: Shelf) -> None:
+    may = {"authorization": f"Bearer {shelf.add('ada', Scope.OPERATE)}"}
+    desk.gate.keyring.take(shelf.read())
+    response = desk.ask("/api/v1/robots/r1", "DELETE", **may)
     assert (response.status_code, response.content) == (204, b"")
-    assert desk.get("/robots/r1").status_code == 404
-    assert "r1" not in str(desk.get("/groups").json()["groups"])
+    assert desk.get("/robots/r1", **may).status_code == 404
+    assert "r1" not in str(desk.get("/groups", **may).json()["groups"])
     events = [event for news in notebook.news for event in news.events if event.event is EventKind.STATUS]
     assert [(event.by, event.robots) for event in events] == [("ada", ["r1"])]
-    assert desk.ask("/api/v1/robots/r1", "DELETE").status_code == 404
+    assert desk.ask("/api/v1/robots/r1", "DELETE", **may).status_code == 404
