@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import errno
+import gc
+import logging
 import signal
 import socket
+import sys
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -28,7 +32,13 @@ from covista_service.telemetry import Summary
 _GRACE_S = 1
 # How often the certificate's files are looked at.
 _CERTIFICATE_S = 10.0
+# A start that takes longer is one that compiles.
+_LOOK_S, _PATIENCE_S = 0.2, 5.0
+# How long a thread may keep Python to itself while another waits: 5 ms are noticed where many ask.
+_SWITCH_S = 0.0005
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+log = logging.getLogger(__name__)
 
 
 class StartError(CovistaError):
@@ -53,6 +63,7 @@ def run(settings: Settings, *, ready: Callable[[Running], None] | None = None, s
     app = create_app(settings)
     certificates = _certificates(settings)
     listener = _bind(settings.api_address)
+    sys.setswitchinterval(_SWITCH_S)
     try:
         asyncio.run(_serve(app, settings, listener, certificates, ready, signals=signals))
     finally:
@@ -104,7 +115,23 @@ async def _serve(
             running = Running(_url(settings, listener), settings.link, parts.telemetry.summary, server.stop)
             server.when_started = (lambda: ready(running)) if ready else _nothing
             server.when_stopping = parts.stream.close
-            await server.serve([listener])
+            settling = asyncio.create_task(_settle(parts), name="covista-settling")
+            try:
+                await server.serve([listener])
+            finally:
+                settling.cancel()
+
+
+async def _settle(parts: Parts) -> None:
+    """Once all that stays is loaded, leave it alone: a collector that looks through it holds up everybody's answer."""
+    begun_s, told = time.monotonic(), False
+    while parts.health().status == "starting":
+        await asyncio.sleep(_LOOK_S)
+        if not told and time.monotonic() - begun_s > _PATIENCE_S:
+            told = True
+            log.info("loads compiled code; what is not there yet is compiled, which takes a minute or two")
+    gc.freeze()
+    log.info("ready")
 
 
 class _Server(uvicorn.Server):

@@ -27,11 +27,15 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class LoadOptions:
-    """`robots` send keyframes of `features` features, and poses; how often and for how long says each `March`."""
+    """`robots` send keyframes of `features` features, and poses; how often and for how long says each `March`.
+
+    Their ids begin with `prefix`.
+    """
 
     connect: str
     robots: int = 20
     features: int = 500
+    prefix: str = PREFIX
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +70,7 @@ def play(line: Line, options: LoadOptions, ready: Stock | None = None) -> None:
 
     Robots connect before the first march. `Sent` is said after each.
     """
-    crowd = Crowd(ready or stock(options.robots, options.features), options.robots, prefix=PREFIX)
+    crowd = Crowd(ready or stock(options.robots, options.features), options.robots, prefix=options.prefix)
     line.send(Prepared())
     orders: SimpleQueue[March | None] = SimpleQueue()
     gone = threading.Event()

@@ -1,7 +1,7 @@
 """How soon does mission control have its answers while robots are at work?
 
-100 robots send as many keyframes and poses as 20 do otherwise, and 50 clients ask for the groups and for all robots
-once a second each. Then nobody sends, and one asks for the similarity matrix of a thousand robots as numbers.
+20 robots send a keyframe and a pose a second each, 80 others are there, and 50 clients ask for the groups and for all
+robots once a second each. Then nobody sends, and one asks for the similarity matrix of a thousand robots as numbers.
 """
 
 from __future__ import annotations
@@ -13,20 +13,21 @@ from contextlib import ExitStack
 import httpx
 from covista_clients.simulation.marching import March
 
-from covista_service.bench import audience
+from covista_service.bench import audience, load
 from covista_service.bench.audience import Attended, AudienceOptions
-from covista_service.bench.load import LoadOptions
+from covista_service.bench.load import LoadOptions, Prepared, Sent
 from covista_service.bench.rig import LoadError, Rig, expect, free_endpoint, rig
 from covista_service.bench.row import Row, median, quantile, spread
 from covista_service.demo import children
 
 MOST_READ_MS = 50.0
 MOST_MATRIX_MS = 100.0
-ROBOTS, LIVE_ROBOTS, CLIENTS = 100, 20, 50
+ROBOTS, OTHERS, CLIENTS = 20, 80, 50
 CROWD = 1000
 _GROUPS, _ROBOTS, _MATRIX = "/api/v1/groups", "/api/v1/robots", "/api/v1/similarity"
 _SECONDS, _LONG_SECONDS = 10.0, 60.0
 _LEAD_S = 5.0
+_RATE_HZ = 1.0
 _ROUNDS = 9
 _X_NPY = {"accept": "application/x-npy"}
 
@@ -34,7 +35,7 @@ _X_NPY = {"accept": "application/x-npy"}
 def rows(long: bool) -> Iterator[Row]:
     """`rest/groups_p99` and `robots_p99`, beside one client of a station that is left alone, and `matrix_n1000`."""
     seconds = _LONG_SECONDS if long else _SECONDS
-    quiet, pressed = reads(seconds, ROBOTS, LIVE_ROBOTS, CLIENTS)
+    quiet, pressed = reads(seconds, ROBOTS, OTHERS, CLIENTS)
     for case, path in (("groups_p99", _GROUPS), ("robots_p99", _ROBOTS)):
         p99_ms = quantile(pressed.times_ms[path], 0.99)
         yield Row(
@@ -62,14 +63,22 @@ def rows(long: bool) -> Iterator[Row]:
     )
 
 
-def reads(seconds: float, robots: int, live: int, clients: int) -> tuple[Attended, Attended]:
+def reads(seconds: float, robots: int, others: int, clients: int) -> tuple[Attended, Attended]:
     """What one client sees of a station that is left alone, and many see of one that works. Raises LoadError."""
+    endpoint = free_endpoint()
     with ExitStack() as stack:
-        running = stack.enter_context(rig(LoadOptions(free_endpoint(), robots=robots)))
-        running.march(March(live / robots, live / robots, _LEAD_S))
+        running = stack.enter_context(rig(LoadOptions(endpoint, robots=robots)))
+        bystanders = children.start(load.__name__, LoadOptions(endpoint, robots=others, features=200, prefix="c"))
+        stack.callback(bystanders.end)
+        expect(bystanders, Prepared)
+        bystanders.line.send(March(1 / _LEAD_S, 1 / _LEAD_S, _LEAD_S))
+        running.march(March(_RATE_HZ, _RATE_HZ, _LEAD_S))
+        expect(bystanders, Sent)
         running.settle()
         quiet = _attended(running, 1, seconds / 2, None)
-        pressed = _attended(running, clients, seconds, March(live / robots, live / robots, seconds + 1.0))
+        pressed = _attended(running, clients, seconds, March(_RATE_HZ, _RATE_HZ, seconds + 1.0))
+        if len(running.watch.robots().robots) != robots + others:
+            raise LoadError("some robots were not heard")
         return quiet, pressed
 
 

@@ -13,7 +13,7 @@ from multiprocessing.connection import Connection
 
 from covista_service.perception.camera import Features
 from covista_service.workers.arena import Lent, Slip
-from covista_service.workers.jobs import load, perform, use_one_core
+from covista_service.workers.jobs import begin_to_work, load, perform
 from covista_service.workers.pool import LOADING_S
 
 _END_S = 5.0
@@ -92,7 +92,7 @@ def _work(line: Connection, arena: str | None) -> None:
     station = parent_process()
     if station is not None:
         threading.Thread(target=_follow, args=(station.join,), daemon=True).start()
-    use_one_core()
+    begin_to_work()
     lent = _lent(arena)
     load()
     with suppress(EOFError, OSError):

@@ -6,7 +6,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
 
 from covista_service.loop import CrewStatus
-from covista_service.workers.jobs import Job, use_one_core
+from covista_service.workers.jobs import Job, begin_to_work
 
 _T = TypeVar("_T")
 
@@ -16,7 +16,7 @@ class Threads:
 
     def __init__(self, count: int) -> None:
         self._count = count
-        self._pool = ThreadPoolExecutor(count, "covista-worker", initializer=use_one_core)
+        self._pool = ThreadPoolExecutor(count, "covista-worker", initializer=begin_to_work)
 
     def submit(self, job: Job[_T]) -> Future[_T]:
         """Have a job done. Raises RuntimeError where the pool is closed."""
