@@ -43,6 +43,11 @@ def test_the_wheel_holds_the_wire_for_other_languages(contents: list[str]) -> No
     assert "covista_schemas/robot.proto" in contents
 
 
+def test_the_wheel_holds_every_schema_that_the_database_had(contents: list[str]) -> None:
+    migrations = "covista_service/store/migrations"
+    assert {f"{migrations}/env.py", f"{migrations}/versions/r0001_groups_and_events.py"} <= set(contents)
+
+
 def test_the_wheel_carries_its_license(contents: list[str]) -> None:
     assert any(name.endswith(".dist-info/licenses/LICENSE") for name in contents)
 

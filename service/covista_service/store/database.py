@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from covista_schemas.errors import CovistaError
-from sqlalchemy import URL, Connection, Engine, create_engine, event
+from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
 from sqlalchemy.exc import (
     ArgumentError,
     DataError,
@@ -45,6 +45,8 @@ def check_url(url: str) -> None:
 def open_engine(url: str, *, reads: bool = False) -> Engine:
     """An engine for `url`, which `reads` only or writes; nothing is connected yet. Raises DatabaseError."""
     try:
+        if make_url(url).get_backend_name() == "sqlite" and make_url(url).database in (None, "", ":memory:"):
+            raise DatabaseError(f"{_SETTING}: what is in memory is gone with the station: name a file, or a server")
         engine = create_engine(url, pool_pre_ping=True, pool_timeout=WAIT_S)
     except (ImportError, NoSuchModuleError) as error:
         raise DatabaseError(

@@ -114,11 +114,14 @@ class History:
 
         Before the loop runs.
         """
+        nothing = Memory(revision=self.last.revision, label=self.last.label, event=self.last.event)
+        if not self._writer.continues:
+            return nothing
         try:
             return self._writer.recall(forget_after_s, unknown_after_s)
         except UNUSABLE as error:
             log.warning("nothing is remembered", extra=about(said=first_line(error)))
-            return Memory(revision=self.last.revision, label=self.last.label, event=self.last.event)
+            return nothing
 
     def stored_settings(self) -> dict[str, object]:
         """The last value of every live setting that was given, by its name such as hysteresis.gain."""

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import islice
 
 from sqlalchemy import Connection, Table, delete
 
 from covista_service.answers.robots import camera_message
 from covista_service.perception.camera import Pose
 from covista_service.station.events import Keyframe, KeyframeId, Pair
-from covista_service.station.pairs import Answer
+from covista_service.station.pairs import Answer, PairRecord
 from covista_service.station.snapshot import RobotView, Snapshot
 from covista_service.store.sampler import pose_of
 from covista_service.store.tables import POSE, keyframes_now, pairs_now, robots_now
@@ -17,6 +19,8 @@ from covista_service.store.upserts import Row, remove, upsert
 
 # An overlap that has changed by less since it was written is written with the next keyframe.
 _CHANGED = 0.01
+# So many pairs are written at a time; of a thousand robots more may change in a second, and wait for the next.
+_MOST_PAIRS = 1000
 # Keyframes that nothing names any more are looked for after so many writes.
 _SWEEP = 30
 # Who has a token and sends nothing is written so often.
@@ -33,6 +37,19 @@ class _Changes:
     gone: dict[Table, list[tuple[object, ...]]] = field(default_factory=lambda: {table: [] for table in _TABLES})
 
 
+@dataclass(frozen=True, slots=True)
+class _Written:
+    """What was written of an answer: whoever kept the answer itself would keep images and surfaces too."""
+
+    overlaps: tuple[float, float]
+    computed_ns: int
+    keyframes: tuple[KeyframeId, KeyframeId]
+
+    @classmethod
+    def of(cls, answer: Answer) -> _Written:
+        return cls(answer.overlaps, answer.computed_ns, answer.keyframes)
+
+
 class Present:
     """What the database knows of the present; not for several threads at once.
 
@@ -47,7 +64,9 @@ class Present:
         self._fresh = True
         self._writes = 0
         self._robots: dict[str, tuple[RobotView, int]] = {}
-        self._pairs: dict[Pair, Answer | None] = {}
+        self._pairs: dict[Pair, _Written | None] = {}
+        self._records: Mapping[Pair, PairRecord] = {}
+        self._waiting: dict[Pair, None] = {}
         self._keyframes: set[KeyframeId] = set()
 
     def write(self, connection: Connection, snapshot: Snapshot) -> None:
@@ -78,20 +97,25 @@ class Present:
             changes.gone[robots_now].append((name,))
 
     def _change_pairs(self, snapshot: Snapshot, changes: _Changes) -> None:
-        pairs = self._pairs
+        pairs, waiting, seen = self._pairs, self._waiting, self._records
         for pair, record in snapshot.records.items():
-            answer = record.answer
-            if pair in pairs and (pairs[pair] is answer or _hardly_other(pairs[pair], answer)):
-                continue
-            pairs[pair] = answer
-            changes.rows[pairs_now].append(self._pair(pair, answer, snapshot, changes))
+            if seen.get(pair) is not record and not (pair in pairs and _hardly_other(pairs[pair], record.answer)):
+                waiting[pair] = None
+        self._records = snapshot.records
+        # Who has waited longest comes first, with what is known of it now.
+        for pair in list(islice(waiting, _MOST_PAIRS)):
+            del waiting[pair]
+            if pair in snapshot.records:
+                answer = snapshot.records[pair].answer
+                pairs[pair] = None if answer is None else _Written.of(answer)
+                changes.rows[pairs_now].append(self._pair(pair, answer, snapshot, changes))
         for pair in [pair for pair in pairs if pair not in snapshot.records]:
             del pairs[pair]
             changes.gone[pairs_now].append(pair)
 
     def _sweep(self, changes: _Changes) -> None:
         """Keyframes are named by the rows that stand: those of the answers written last, and of robots."""
-        named = {name for answer in self._pairs.values() if answer is not None for name in answer.keyframes}
+        named = {name for written in self._pairs.values() if written is not None for name in written.keyframes}
         named |= {view.in_use.id for view, _ in self._robots.values() if view.in_use is not None}
         for name in self._keyframes - named:
             changes.gone[keyframes_now].append((name.robot, name.boot, name.sequence))
@@ -163,15 +187,15 @@ def _pose(pose: Pose) -> Row:
     return dict(zip(POSE, pose_of(pose), strict=True))
 
 
-def _hardly_other(written: Answer | None, answer: Answer | None) -> bool:
+def _hardly_other(written: _Written | None, answer: Answer | None) -> bool:
     """Would a station that starts not tell the difference?"""
     if written is None or answer is None:
-        return False
+        return written is None and answer is None
     before, now = written.overlaps, answer.overlaps
     return (
         abs(now[0] - before[0]) <= _CHANGED
         and abs(now[1] - before[1]) <= _CHANGED
         and written.computed_ns == answer.computed_ns
-        and written.first is answer.first
-        and written.second is answer.second
+        and written.keyframes[0] is answer.first.id
+        and written.keyframes[1] is answer.second.id
     )

@@ -17,6 +17,7 @@ from covista_service.station.snapshot import Snapshot
 from covista_service.store.rows import PairEntry, TrackEntry
 
 NOTHING = (0.0, 0.0)
+_Read = tuple[int, int, int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,11 +35,11 @@ class Thinning:
 
 @dataclass(frozen=True, slots=True)
 class _Moment:
-    """What was told of a pair last: overlaps, None for unknown, and the record that they are by."""
+    """What was told of a pair last: overlaps, None for unknown, and when they were read for poses of which times."""
 
     time_us: int
     overlaps: tuple[float, float] | None
-    record: PairRecord | None
+    read: _Read | None
 
 
 class Sampler:
@@ -100,8 +101,7 @@ class Sampler:
         before = told.overlaps
         if max(abs(now[0] - before[0]), abs(now[1] - before[1])) > self._thinning.overlap:
             return True
-        anew = told.record is None or told.record.answer is not record.answer
-        return anew and now != NOTHING and abs(time_us - told.time_us) >= self._again_us
+        return told.read != _read(record) and now != NOTHING and abs(time_us - told.time_us) >= self._again_us
 
     def _parted(self, snapshot: Snapshot, time_us: int) -> Iterator[PairEntry]:
         """Pairs that no record is kept of any more: their views cannot meet, or one of the robots is forgotten."""
@@ -119,13 +119,18 @@ class Sampler:
     def _tell(self, snapshot: Snapshot, pair: Pair, record: PairRecord | None, time_us: int) -> PairEntry:
         a, b = pair
         if a not in snapshot.robots or b not in snapshot.robots:
-            self._moments[pair] = _Moment(time_us, None, record)
+            self._moments[pair] = _Moment(time_us, None, None)
             return PairEntry(a, b, time_us, None, None, FoundBy.UNKNOWN)
         view = snapshot.pair(a, b)
         known = view.overlap_a is not None and view.overlap_b is not None
         overlaps = (float(view.overlap_a or 0), float(view.overlap_b or 0)) if known else None
-        self._moments[pair] = _Moment(time_us, overlaps, record)
+        self._moments[pair] = _Moment(time_us, overlaps, _read(record))
         return PairEntry(a, b, time_us, view.overlap_a, view.overlap_b, view.found_by)
+
+
+def _read(record: PairRecord | None) -> _Read | None:
+    answer = None if record is None else record.answer
+    return None if answer is None else (answer.computed_ns, *answer.stands_for_ns)
 
 
 def pose_of(pose: Pose) -> tuple[float, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 from sqlalchemy import Engine, func, literal, select, text
 
@@ -60,7 +60,9 @@ class FileSize:
                 return False
             removed = pages - ask("freelist_count") > most and drop_oldest(connection)
             free = ask("freelist_count")
-            connection.exec_driver_sql(f"PRAGMA incremental_vacuum({min(_PAGES, free, pages - most)})").all()
+            driver: Any = connection.connection.driver_connection
+            # A page a row, though the rows have no columns: they must be fetched.
+            driver.execute(f"PRAGMA incremental_vacuum({min(_PAGES, free, pages - most)})").fetchall()
             return removed or ask("freelist_count") < free
 
 

@@ -45,7 +45,7 @@ class Writer:
         self._clock = clock
         self._size = size_of(self._engine)
         self._present = Present()
-        self._open = self._continues = False
+        self._open = self.continues = False
         self._begun_us: int | None = None
         self._removed: Loss | None = None
         self._reserved = self._used = LastNumbers()
@@ -57,7 +57,7 @@ class Writer:
         """Open the database and go on where it ends: the numbers up to which any may have been used."""
         with self._opening() as last:
             self._used = last
-        self._continues = True
+        self.continues = True
         return self._used
 
     def open(self) -> None:
@@ -122,7 +122,7 @@ class Writer:
 
     def end(self) -> None:
         """Give back numbers that were not used: nobody will use them."""
-        if self._open and self._continues and not file_is_gone(self._engine):
+        if self._open and self.continues and not file_is_gone(self._engine):
             with self._engine.begin() as connection:
                 reserve(connection, self._used)
 

@@ -12,7 +12,7 @@ import pytest
 from covista_schemas.reports import LiveSettings
 from covista_service.answers.past import HistoryUnavailableError
 from covista_service.loop import News
-from covista_service.store.database import SILENCE_S
+from covista_service.store.database import CONNECT_S, SILENCE_S
 from covista_service.store.history import CLOSE_S
 
 from tests.service.deadline import wait_until
@@ -179,6 +179,18 @@ def test_a_server_that_is_frozen_is_given_up_and_comes_back(server: Server, url_
         assert history.flush(10)
         assert [event.id for event in archive.events_after(99)] == [100, 101]
         assert archive.events().gaps == []
+
+
+def test_a_station_that_starts_does_not_wait_long_for_a_frozen_server(
+    server: Server, url_of_server: str, news: News
+) -> None:
+    with kept(url_of_server) as history:
+        history.take(news)
+    began_s = time.monotonic()
+    with server.frozen(), kept(url_of_server) as history:
+        assert history.recall(1e9, 1e9).robots == ()
+        assert history.health().status == "degraded"
+        assert time.monotonic() - began_s < CONNECT_S + 1
 
 
 def test_closing_does_not_wait_for_a_frozen_server(server: Server, url_of_server: str, news: News) -> None:

@@ -1,5 +1,6 @@
 """What was told is written once; a database that cannot be used is waited for, and what it costs is said."""
 
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -138,11 +139,18 @@ def test_the_station_is_looked_at_again_and_again(url: str) -> None:
     scene = two_robots()
     scene.settle()
     with kept(url) as history, opened(url) as archive:
-        history.follow(lambda: scene.snapshot)
+        one_at_a_time = threading.Lock()
+
+        def look() -> object:
+            with one_at_a_time:
+                return scene.snapshot
+
+        history.follow(look)
         wait_until(written(history), "the first look is written")
-        scene.send("r1", pose(5.0))
-        scene.now_ns += S
-        scene.settle()
+        with one_at_a_time:
+            scene.send("r1", pose(5.0))
+            scene.now_ns += S
+            scene.settle()
         wait_until(lambda: len(archive.track("r1").items) == 2, "the way of a robot is written")
         assert [point.position_m[0] for point in archive.track("r1").items] == [0.0, 5.0]
         assert len(archive.track("r2").items) == 1
@@ -245,8 +253,9 @@ def test_what_is_sampled_does_not_push_out_what_was_told(tmp_path: Path) -> None
 def test_an_entry_that_cannot_be_stored_does_not_take_the_others_with_it(url: str) -> None:
     news = news_of(two_robots())
     told = [next(numbered(news, number)) for number in range(1, 40)]
-    # No database has room for such a number.
-    told.insert(17, next(numbered(news, 2**70)))
+    # Half a character: nothing that can be written.
+    torn = news.events[0].model_copy(update={"id": 100, "text": "\ud800"})
+    told.insert(17, News(news.snapshot, (torn,), False, ()))
     with kept(url) as history:
         for each in told:
             history.take(each)
@@ -257,7 +266,9 @@ def test_an_entry_that_cannot_be_stored_does_not_take_the_others_with_it(url: st
     assert ask(url, "select lost from gaps") == [(1,)]
 
 
-@pytest.mark.parametrize("url", ["nonsense://somewhere/db", "sqlite:///covista.db?timeout=long"])
+@pytest.mark.parametrize(
+    "url", ["nonsense://somewhere/db", "sqlite:///covista.db?timeout=long", "sqlite://", "sqlite:///:memory:"]
+)
 def test_a_url_that_can_never_work_is_a_mistake_in_the_settings(url: str) -> None:
     with pytest.raises(DatabaseError, match=r"setting database \(--database, COVISTA_DATABASE\)"):
         check_url(url)
