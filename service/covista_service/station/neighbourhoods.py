@@ -150,12 +150,10 @@ class Neighbourhoods:
 
     def place(self, robot: str) -> None:
         """A robot takes part in the groups from now on, with all that is known of its pairs."""
-        others = [other for other in self._groups.robots if other != robot]
-        for other in others:
+        for other in self._pairs.beside(robot):
             pair = pair_of(robot, other)
-            if pair in self._pairs:
-                self._groups.see(pair, self._pairs.overlaps(pair))
-        self._share_nothing(robot, others)
+            self._groups.see(pair, self._pairs.overlaps(pair))
+        self._share_nothing(robot, self._groups.robots)
 
     def expire(self, now_ns: int) -> bool:
         """Let the answers about robots that have not been judged for long stand no more; False if there are none."""
@@ -299,15 +297,10 @@ class Neighbourhoods:
         judged = self._judged.get(robot)
         if judged is None:
             return
-        lapsed = robot in self._lapsed
-        known = [
-            other
-            for other in others
-            if other != robot
-            and other in self._judged
-            and not (lapsed and other in self._lapsed)
-            and pair_of(robot, other) not in self._pairs
-        ]
+        lapsed = self._lapsed if robot in self._lapsed else {}
+        # Said of all robots when one comes: what is known of pairs is asked for once.
+        beside = {robot, *self._pairs.beside(robot)}
+        known = [other for other in others if other in self._judged and other not in beside and other not in lapsed]
         self._groups.see_row(robot, known, 0.0)
 
     def _worth_another_look(self, pair: Pair) -> bool:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Container, Mapping
 from dataclasses import replace
 
-import numpy as np
 from covista_schemas.keys import ID_PATTERN
 from covista_schemas.messages import COEFFICIENT_COUNTS
 from covista_schemas.reports import FoundBy
@@ -144,23 +144,24 @@ def _is_keyframe(keyframe: RememberedKeyframe, robot: str) -> bool:
 
 def _is_place(pose: Pose) -> bool:
     """Is it a rotation, and a place where a robot can be?"""
-    turned, centre_m = pose.world_from_camera, pose.centre_m
-    if turned.shape != (3, 3) or centre_m.shape != (3,) or not (np.abs(centre_m) < FARTHEST_M).all():
+    if pose.world_from_camera.shape != (3, 3) or pose.centre_m.shape != (3,):
         return False
+    # Numbers of Python's own: of so few an array's cost twenty times as much, and there are many thousand poses.
+    x, y, z = pose.world_from_camera.tolist()
+    dots = ((x, x, 1.0), (y, y, 1.0), (z, z, 1.0), (x, y, 0.0), (x, z, 0.0), (y, z, 0.0))
     # NaN is not less than anything.
-    return bool((np.abs(turned) < 2).all() and (np.abs(turned @ turned.T - np.eye(3)) < _NEARLY).all())
+    return all(abs(each) < FARTHEST_M for each in pose.centre_m.tolist()) and all(
+        abs(one[0] * other[0] + one[1] * other[1] + one[2] * other[2] - wanted) < _NEARLY for one, other, wanted in dots
+    )
 
 
 def _is_camera(camera: Camera) -> bool:
-    matrix, counts = camera.matrix, COEFFICIENT_COUNTS.get(camera.distortion, ())
-    if matrix.shape != (3, 3) or len(camera.coefficients) not in counts:
+    if camera.matrix.shape != (3, 3) or len(camera.coefficients) not in COEFFICIENT_COUNTS.get(camera.distortion, ()):
         return False
-    focal_px, centre_px = matrix[[0, 1], [0, 1]], matrix[:2, 2]
-    return bool(
-        (focal_px >= _FOCAL_PX[0]).all()
-        and (focal_px <= _FOCAL_PX[1]).all()
-        and (np.abs(centre_px) <= _FARTHEST_PX).all()
-        and np.isfinite(matrix).all()
-        and np.isfinite(camera.coefficients).all()
-        and 0 < min(camera.width, camera.height) <= max(camera.width, camera.height) <= _MOST_PX
+    (fx, skew, cx), (_, fy, cy), _ = camera.matrix.tolist()
+    return (
+        all(_FOCAL_PX[0] <= each <= _FOCAL_PX[1] for each in (fx, fy))
+        and all(abs(each) <= _FARTHEST_PX for each in (skew, cx, cy))
+        and all(0 < each <= _MOST_PX for each in (camera.width, camera.height))
+        and all(map(math.isfinite, camera.coefficients))
     )

@@ -137,6 +137,8 @@ class Roster:
         self._forget_after_ns = nanoseconds(options.forget_after_s)
         self._robots: dict[str, Robot] = {}
         self._forgotten: dict[Topic, Total] = {"keyframe": Total(), "pose": Total()}
+        # Tokens of robots that were forgotten though they live: they are not told again when those come back.
+        self._tokens: dict[str, set[str]] = {}
 
     def accounts(self) -> dict[Topic, Counts]:
         """The accounts of all robots by topic, those that are forgotten included."""
@@ -162,7 +164,7 @@ class Roster:
     def meet(self, robot: str) -> Robot:
         """A robot, known from now on."""
         if robot not in self._robots:
-            self._robots[robot] = Robot(robot)
+            self._robots[robot] = Robot(robot, tokens=self._tokens.pop(robot, set()))
         return self._robots[robot]
 
     def restore(self, known: Recollection, now_ns: int) -> None:
@@ -180,7 +182,10 @@ class Roster:
 
     def forget(self, robot: str) -> None:
         """Drop all that is known of a robot, but for what it adds to the accounts of all."""
-        for topic, ledger in self._robots.pop(robot).ledgers.items():
+        known = self._robots.pop(robot)
+        if known.tokens:
+            self._tokens[robot] = known.tokens
+        for topic, ledger in known.ledgers.items():
             ledger.close()
             ledger.add_to(self._forgotten[topic])
 
@@ -198,6 +203,10 @@ class Roster:
         if known is not None and boot in known.tokens:
             known.tokens.remove(boot)
             known.sign_of_life_ns = now_ns
+        elif known is None and robot in self._tokens:
+            self._tokens[robot].discard(boot)
+            if not self._tokens[robot]:
+                del self._tokens[robot]
 
     def status(self, robot: Robot, now_ns: int) -> Status:
         """Live, stale or gone at `now_ns`."""

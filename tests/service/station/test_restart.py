@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from tests.service.station.memories import plain
 from tests.service.station.scenes import BACK, NOTHING, S, Scene, happenings, measured, pose, surveys
 from tests.service.station.test_groups import changes, groups, share, two_groups
-from tests.service.station.test_laws import Life
+from tests.service.station.test_laws import Life, assert_agreement
 
 ROBOTS = ("a1", "a2", "a3", "b1", "b2", "b3")
 
@@ -285,9 +285,11 @@ def test_a_life_with_restarts_goes_on_and_leaves_nothing_behind(seed: int) -> No
     for _ in range(4):
         for _ in range(6):
             life.step()
+            assert_agreement(life.scene.snapshot)
         before = life.scene.snapshot
         life.scene = life.scene.restarted(float(life.rng.uniform(-50, 90)))
         assert [effect for effect in life.scene.tick() if isinstance(effect, SurveyPair)] == []
+        assert_agreement(life.scene.snapshot)
         assert life.scene.snapshot.groups.revision >= before.groups.revision
         assert life.scene.snapshot.groups.last_label >= before.groups.last_label
     scene = life.scene

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from covista_schemas.reports import EventKind, FoundBy
+from covista_schemas.reports import EventKind, FoundBy, Status
 from covista_service.station.events import (
     BuildSurfaces,
     ExtractFeatures,
@@ -13,6 +13,7 @@ from covista_service.station.events import (
     SurveyDone,
     SurveyPair,
     Tick,
+    TokenLost,
     TokenSeen,
 )
 from covista_service.station.ledger import FORGOTTEN, Counts
@@ -71,6 +72,21 @@ def test_a_robot_that_still_sends_comes_back_as_a_newcomer() -> None:
     assert view.group == scene.snapshot.robots["a2"].group
     assert view.keyframes == Counts(received=1, used=1, missing=1)
     assert scene.station.census().accounts["keyframe"].used == 7
+
+
+def test_a_robot_that_comes_back_lives_by_the_token_that_it_has_had_all_the_time() -> None:
+    scene = Scene()
+    scene.receive(TokenSeen("r1", "b0"), TokenSeen("r1", "b1"), ForgetRobot("r1"), TokenLost("r1", "b0"))
+    scene.send_pose("r1", pose(0))
+    scene.wait(100)
+    assert scene.snapshot.robots["r1"].status is Status.LIVE
+    scene.receive(TokenLost("r1", "b1"))
+    scene.wait(5)
+    assert scene.snapshot.robots["r1"].status is Status.STALE
+    scene.receive(TokenSeen("r2", "b0"), ForgetRobot("r2"), TokenLost("r2", "b0"))
+    scene.send_pose("r2", pose(0))
+    scene.wait(5)
+    assert scene.snapshot.robots["r2"].status is Status.STALE
 
 
 def test_surveys_of_a_robot_that_is_forgotten_meanwhile_are_dropped_when_they_return() -> None:
