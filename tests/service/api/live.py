@@ -154,7 +154,7 @@ class Ear:
         self._socket.settimeout(DEADLINE_S)
         self._socket.connect(("127.0.0.1", site.port))
         header = "" if last is None else f"last-event-id: {last}\r\n"
-        self._socket.sendall(f"GET /api/v1/events{query} HTTP/1.0\r\nhost: station\r\n{header}\r\n".encode())
+        self._socket.sendall(f"GET /api/v1/events{query} HTTP/1.0\r\nhost: localhost\r\n{header}\r\n".encode())
         self._file = self._socket.makefile("rb")
         self.status = int(self._file.readline().split()[1])
         lines = iter(self._file.readline, b"\r\n")

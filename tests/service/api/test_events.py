@@ -268,7 +268,7 @@ def test_all_streams_end_with_a_last_word_when_the_station_stops(station: Site) 
 def test_head_tells_of_the_stream_and_does_not_begin_it(station: Site) -> None:
     response = station.ask("HEAD", "/events")
     assert (response.status_code, response.headers["content-type"]) == (200, "text/event-stream; charset=utf-8")
-    assert station.parts.stream.listeners == 0
+    wait_until(lambda: station.parts.stream.listeners == 0)
 
 
 def test_an_event_is_put_into_words_once_however_many_listen(station: Site, monkeypatch: pytest.MonkeyPatch) -> None:
