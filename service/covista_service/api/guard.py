@@ -21,12 +21,14 @@ from starlette.types import Scope as Request
 from covista_service.access import Admitted, Gate, Refusal, Refused, Scope, is_loopback
 from covista_service.api.delivery import CUT
 from covista_service.api.deps import State
+from covista_service.api.docs_page import FILE_NAMES, FILES
 from covista_service.api.errors import refuse
 from covista_service.api.timing import PREFIX
 
 # In the scope of a request: the name of the token that it came with, or None.
 BY = "covista.by"
-OPEN = frozenset({"/healthz", "/readyz", "/docs", "/docs/oauth2-redirect", "/openapi.json"})
+# The page of the description is the same for every station, and so are its files.
+OPEN = frozenset({"/", "/healthz", "/readyz", "/docs", "/openapi.json"} | {f"{FILES}/{name}" for name in FILE_NAMES})
 _ASKS = frozenset({"GET", "HEAD", "OPTIONS"})
 # Computes, and changes nothing.
 _ASKS_BY_POST = frozenset({f"{PREFIX}/groups/preview"})

@@ -5,6 +5,8 @@ from __future__ import annotations
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from covista_service.api.docs_page import DOCS
+
 _ALWAYS = {
     "x-content-type-options": "nosniff",
     "x-frame-options": "DENY",
@@ -12,13 +14,11 @@ _ALWAYS = {
     "cross-origin-resource-policy": "same-origin",
 }
 _CONTENT = "default-src 'none'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
-# The page of FastAPI has a script of its own, and takes Swagger UI from where that is published.
+# The page of the description has a script of its own.
 _DOCS = (
-    "default-src 'none'; script-src 'unsafe-inline' https://cdn.jsdelivr.net; style-src 'unsafe-inline' "
-    "https://cdn.jsdelivr.net; img-src 'self' data: https://fastapi.tiangolo.com; connect-src 'self'; "
-    "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
+    "default-src 'none'; script-src 'self' 'unsafe-inline'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
+    "connect-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
 )
-_DOCS_PATHS = ("/docs", "/docs/oauth2-redirect")
 _A_YEAR = "max-age=31536000"
 
 
@@ -39,7 +39,7 @@ def with_headers(app: ASGIApp) -> ASGIApp:
 def _complete(headers: MutableHeaders, scope: Scope) -> None:
     for name, value in _ALWAYS.items():
         headers.setdefault(name, value)
-    headers.setdefault("content-security-policy", _DOCS if scope["path"] in _DOCS_PATHS else _CONTENT)
+    headers.setdefault("content-security-policy", _DOCS if scope["path"] == DOCS else _CONTENT)
     # What has a version may be kept by who asked, to be asked for again; all else is stale at once, and not for others.
     headers.setdefault("cache-control", "private, no-cache" if "etag" in headers else "no-store")
     if scope["scheme"] == "https":

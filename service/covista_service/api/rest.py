@@ -14,6 +14,7 @@ from covista_service.access import Door
 from covista_service.api import contract, errors, events, groups, health, pairs, robots, settings, similarity
 from covista_service.api.bodies import bounded
 from covista_service.api.deps import PartsNow
+from covista_service.api.docs_page import serve_docs
 from covista_service.api.guard import guarded
 from covista_service.api.listening import HEAD_ONLY
 from covista_service.api.timing import PREFIX, timed
@@ -30,6 +31,7 @@ def build(lifespan: Lifespan[FastAPI] | None = None, cors_origins: Sequence[str]
         version=version("covista"),
         description="What robots see in common, and which of them belong together.",
         lifespan=lifespan,
+        docs_url=None,
         redoc_url=None,
     )
     nouns = APIRouter(prefix=PREFIX, responses=errors.describe(422, 500))
@@ -55,6 +57,7 @@ def build(lifespan: Lifespan[FastAPI] | None = None, cors_origins: Sequence[str]
     # FastAPI's way to replace its own description is to assign the method.
     setattr(app, "openapi", contract.describe(app))  # noqa: B010 - mypy refuses the plain assignment
     _serve_description(app)
+    serve_docs(app)
     return app
 
 

@@ -36,7 +36,8 @@ def log_to_stderr(level: str, form: LogFormat = "text", lines_per_minute: int = 
     logging.basicConfig(level=max(least, logging.INFO), handlers=[handler], force=True)
     for package in _OURS:
         logging.getLogger(package).setLevel(least)
-    # Each request of a dashboard is not news.
+    # Neither each step of a migration nor each request of a dashboard is news.
+    logging.getLogger("alembic").setLevel(logging.WARNING)
     logging.getLogger("uvicorn.access").setLevel(logging.WARNING)
 
 

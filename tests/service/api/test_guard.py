@@ -18,7 +18,7 @@ from tests.service.api.conftest import Desk, open_gate
 from tests.service.api.expositions import families
 
 OPEN = ("/healthz", "/readyz", "/docs", "/openapi.json")
-ASKED = ("/api/v1/robots", "/api/v1/robots/r1", "/api/v1/groups", "/api/v1/similarity", "/metrics", "/nothing", "/")
+ASKED = ("/api/v1/robots", "/api/v1/robots/r1", "/api/v1/groups", "/api/v1/similarity", "/metrics", "/nothing")
 # Whether there are such routes or not: who may not pass does not learn.
 CHANGES = (
     ("DELETE", "/api/v1/robots/nobody"),
