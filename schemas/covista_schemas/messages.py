@@ -95,7 +95,7 @@ class Pose:
             raise ValueError(f"position_m: farther than {MAX_DISTANCE_M:.0e} m from the origin")
         norm = math.hypot(*self.orientation_xyzw)
         if abs(norm - 1.0) > UNIT_TOLERANCE:
-            raise ValueError(f"orientation_xyzw: length {norm:.4g}, not 1")
+            raise ValueError(f"orientation_xyzw: a quaternion of norm {norm:.4g}, not 1")
         if not (isinstance(self.time_ns, int | np.integer) and -(2**63) <= self.time_ns < 2**63):
             raise ValueError(f"time_ns: {self.time_ns!r} is not a whole number of 64 bits")
 

@@ -8,13 +8,16 @@ import typer
 
 from covista_clients.commands import tables
 from covista_clients.commands.options import DEFAULT_URL, Authorities, Format, Output, Token, Url, station
-from covista_clients.commands.showing import show
+from covista_clients.commands.showing import show, tell_if_starting
 
 
 def robots(url: Url = DEFAULT_URL, token: Token = None, ca: Authorities = None, output: Output = Format.TABLE) -> None:
     """Say which robots there are, where they stand, and what became of their messages."""
     with station(url, token, ca) as control:
-        show(control.robots(), tables.robots, output)
+        found = control.robots()
+        show(found, tables.robots, output)
+        if not found.robots:
+            tell_if_starting(control)
 
 
 def pairs(
@@ -30,7 +33,10 @@ def pairs(
 ) -> None:
     """Say how much each pair of robots sees in common, and how that is known."""
     with station(url, token, ca) as control:
-        show(control.pairs(robot, min_overlap), tables.pairs, output)
+        found = control.pairs(robot, min_overlap)
+        show(found, tables.pairs, output)
+        if not found.pairs:
+            tell_if_starting(control)
 
 
 def similarity(
@@ -44,7 +50,10 @@ def similarity(
 def groups(url: Url = DEFAULT_URL, token: Token = None, ca: Authorities = None, output: Output = Format.TABLE) -> None:
     """Say which robots belong together."""
     with station(url, token, ca) as control:
-        show(control.groups(), tables.groups, output)
+        found = control.groups()
+        show(found, tables.groups, output)
+        if not found.groups:
+            tell_if_starting(control)
 
 
 def forget(

@@ -146,7 +146,10 @@ class Rover:
         deadline_s = time.monotonic() + (CLOSE_TIMEOUT_S if wait_s is None else wait_s)
         try:
             if wait_s != 0 and not (self._drain(deadline_s) and self._confirm(deadline_s)):
-                logger.warning("%s leaves without the station's confirmation of all it had to say", self.robot)
+                logger.warning(
+                    "%s leaves without the station's confirmation of all it had to say; is the station still starting?",
+                    self.robot,
+                )
         finally:
             atexit.unregister(self._leave)
             self._stop.set()

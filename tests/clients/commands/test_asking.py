@@ -1,5 +1,7 @@
+from typing import Literal
+
 import pytest
-from covista_schemas.reports import GroupsReport, Score
+from covista_schemas.reports import GroupsReport, Health, PartHealth, RobotsReport, Score
 
 from tests.clients import sample
 from tests.clients.commands.conftest import Run, _Station
@@ -114,3 +116,15 @@ def test_a_file_of_authorities_that_is_not_there_is_one_line(run: Run) -> None:
     code, _, err = run("groups", "--url", "https://127.0.0.1:1", "--ca", "absent.pem")
     assert code == 1
     assert err.startswith("covista: absent.pem cannot be used")
+
+
+@pytest.mark.parametrize("status", ["starting", "ready"])
+def test_of_a_station_that_is_starting_it_is_told_that_it_knows_nobody_yet(
+    run: Run, api: _Station, monkeypatch: pytest.MonkeyPatch, status: Literal["starting", "ready"]
+) -> None:
+    health = Health(status=status, parts={"loop": PartHealth(status=status, detail="loading compiled code")})
+    monkeypatch.setitem(sample.ANSWERS, "/api/v1/robots", RobotsReport(robots=[]))
+    monkeypatch.setitem(sample.ANSWERS, "/readyz", health)
+    code, _, err = run("robots", "--url", api.url)
+    assert code == 0
+    assert err == ("The station is still starting (loop: loading compiled code).\n" if status == "starting" else "")

@@ -87,7 +87,7 @@ def test_silence_is_told(
     [
         ("--pose", "1 2 3", "--pose '1 2 3' is not"),
         ("--pose", "1 2 3 0 0 0 x", "--pose '1 2 3 0 0 0 x' is not"),
-        ("--pose", "1 2 3 0 0 0 2", "orientation_xyzw: length 2, not 1"),
+        ("--pose", "1 2 3 0 0 0 2", "orientation_xyzw: a quaternion of norm 2, not 1"),
         ("--robot", "R 1", "robot 'R 1' does not match"),
         ("--site", "no/site", "site 'no/site' does not match"),
         ("--connect", "nonsense", "'nonsense' is not an end point"),
