@@ -199,12 +199,14 @@ def _reckon(toll: Toll, left: _Left, life: _Life) -> None:
     if left.steady:
         stand = {group.label: group.robots for group in groups.groups}
         toll.labels_lost += sum(stand.get(group.label) != group.robots for group in left.groups.groups)
+    before = [event for event in left.heard if event.time.timestamp() < left.killed_s - GRACE_S]
+    shared = [pair for pair in left.pairs.pairs if pair.overlap_a]
+    if not before or not shared or not left.groups.groups:
+        raise LoadError("a station was killed that had nothing to remember")
     known = {(pair.a, pair.b) for pair in pairs.pairs if pair.overlap_a is not None}
-    toll.pairs_lost += sum((each.a, each.b) not in known for each in left.pairs.pairs if each.overlap_a)
+    toll.pairs_lost += sum((each.a, each.b) not in known for each in shared)
     kept = {event.id for event in _events(life)}
-    toll.events_lost += sum(
-        event.id not in kept for event in left.heard if event.time.timestamp() < left.killed_s - GRACE_S
-    )
+    toll.events_lost += sum(event.id not in kept for event in before)
 
 
 def _events(life: _Life) -> Iterator[EventReport]:
