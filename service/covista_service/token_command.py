@@ -1,4 +1,7 @@
-"""`covista-station token`: makes, lists and revokes tokens, while the station runs or not."""
+"""`covista-station token`: makes, lists and revokes tokens, while the station runs or not.
+
+What it needs of the station is imported when a command runs: the command line must start without the extra too.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +10,14 @@ import re
 from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Literal, NoReturn
+from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
 
 import typer
 from covista_schemas.errors import CovistaError
 from covista_schemas.keys import ID_PATTERN
 
-from covista_service.access.scopes import Scope, written
-from covista_service.access.tokens import Token, TokenError
+if TYPE_CHECKING:
+    from covista_service.access.tokens import Token
 
 EXIT_REFUSED = 1
 EXIT_SETTINGS = 2
@@ -32,15 +35,17 @@ NameArgument = Annotated[str, typer.Argument(metavar="NAME", help="Who has it, s
 def add(
     name: NameArgument,
     scope: Annotated[
-        list[Scope] | None, typer.Option(help="What it allows; operate includes read; repeatable. [read]")
+        list[Literal["read", "operate"]] | None,
+        typer.Option(help="What it allows; operate includes read; repeatable. [read]"),
     ] = None,
     config: ConfigOption = None,
     database: DatabaseOption = None,
 ) -> None:
     """Make a token and print it: it is shown this once and stored nowhere. A station that runs knows it at once."""
+    from covista_service.access.scopes import Scope, written
     from covista_service.store.tokens import Tokens
 
-    held = frozenset(scope or [Scope.READ])
+    held = frozenset(map(Scope, scope or ["read"]))
     try:
         _check_name(name)
         with closing(Tokens(_database(config, database))) as tokens:
@@ -92,6 +97,8 @@ def revoke(name: NameArgument, config: ConfigOption = None, database: DatabaseOp
 
 
 def _check_name(name: str) -> None:
+    from covista_service.access.tokens import TokenError
+
     if not re.fullmatch(ID_PATTERN, name):
         raise TokenError(
             f"{name!r} is no name: small letters, digits, - and _, the first a letter or digit, at most 63"
@@ -106,6 +113,8 @@ def _database(config: Path | None, database: str | None) -> str:
 
 
 def _row(each: Token) -> dict[str, str | None]:
+    from covista_service.access.scopes import written
+
     return {
         "name": each.name,
         "scopes": written(each.scopes),

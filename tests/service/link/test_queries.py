@@ -155,7 +155,7 @@ def test_what_is_larger_than_clients_take_is_refused_with_where_to_get_it(air: A
     matrix = np.random.default_rng(0).random((n, n))
     large = replace(
         snapshot,
-        similarity=SimilarityView(5, tuple(f"r{i}" for i in range(n)), 1.0, matrix, matrix, matrix),
+        similarity=SimilarityView(5, tuple(f"r{i}" for i in range(n)), 1.0, matrix, matrix, matrix, matrix),
     )
     queries = Queries(air.station, "large", lambda: large)
     try:
