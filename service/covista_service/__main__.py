@@ -61,7 +61,7 @@ def serve(
     ] = False,
 ) -> None:
     """Run the station until a signal comes. Each flag is also a variable COVISTA_* and a key of the file."""
-    from covista_service.config import SettingsError, load
+    from covista_service.config import SettingsError, load, without_options
     from covista_service.serve import Running, run
     from covista_service.telemetry import log_to_stderr
 
@@ -80,7 +80,10 @@ def serve(
     log_to_stderr(settings.log_level, settings.log_format, settings.log_lines_per_minute)
 
     def tell(running: Running) -> None:
-        print(f"API {running.url}/api/v1, docs {running.url}/docs, zenoh {', '.join(running.link)}", flush=True)
+        print(
+            f"API {running.url}/api/v1, docs {running.url}/docs, zenoh {', '.join(without_options(running.link))}",
+            flush=True,
+        )
 
     try:
         run(settings, ready=tell)

@@ -18,7 +18,7 @@ from covista_service.api import rest
 from covista_service.api.deps import Parts, State
 from covista_service.api.stream import Stream
 from covista_service.api.vitals import Vitals
-from covista_service.config import Settings, with_stored
+from covista_service.config import Settings, with_stored, without_options
 from covista_service.grouping.warming import warm_up
 from covista_service.link.inbox import Inbox
 from covista_service.link.ingest import Ingest
@@ -112,7 +112,7 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
         stack.push_async_callback(_end, task)
         history.follow(loop.ask)
         close_later(Queries(session, settings.site, loop.ask).close)
-        link = PartHealth(status="ready", detail=", ".join((*settings.link, *settings.connect)))
+        link = PartHealth(status="ready", detail=", ".join(without_options((*settings.link, *settings.connect))))
 
         def health_now() -> Health:
             moving = {"workers": _crew_health(workers, settings.workers)}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple, Self
 from urllib.parse import urlsplit
@@ -44,6 +44,11 @@ class Address(NamedTuple):
 
     host: str
     port: int
+
+
+def without_options(endpoints: Iterable[str]) -> tuple[str, ...]:
+    """Zenoh end points as others may see them: what configures one may be a private key."""
+    return tuple(endpoint.split("#")[0] for endpoint in endpoints)
 
 
 def parse_address(text: str) -> Address:
@@ -179,7 +184,7 @@ class Settings(LiveSettings, BaseSettings):
         shown = {name: str(getattr(self, name)) for name in type(self).model_fields}
         # What is asked of a database, or configures an end point, may hold a key.
         shown["database"] = make_url(self.database).set(query={}).render_as_string(hide_password=True)
-        shown |= {name: ", ".join(each.split("#")[0] for each in getattr(self, name)) for name in ("link", "connect")}
+        shown |= {"link": ", ".join(without_options(self.link)), "connect": ", ".join(without_options(self.connect))}
         shown["cors_origins"] = ", ".join(self.cors_origins)
         return shown
 

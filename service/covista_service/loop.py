@@ -226,13 +226,18 @@ class Loop:
     async def do(self, event: Event) -> None:
         """Have the station take in an event of one's own; returns once it has, and the sinks have heard of it.
 
-        Only in the loop's own thread. Raises TimeoutError where no turn comes.
+        Only in the loop's own thread. Raises TimeoutError where no turn comes; then nothing comes of the event either.
         """
         done: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._results.append(event)
         self._done.append(done)
         self._awake.set()
-        await asyncio.wait_for(done, DO_TIMEOUT_S)
+        try:
+            await asyncio.wait_for(done, DO_TIMEOUT_S)
+        finally:
+            # What was not taken in must not be done when nobody waits for it any more.
+            for waiting in [each for each in self._results if each is event]:
+                self._results.remove(waiting)
 
     def snapshot(self) -> Snapshot:
         """The station as it is; only in the loop's own thread."""

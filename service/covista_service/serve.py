@@ -130,6 +130,7 @@ async def _settle(parts: Parts) -> None:
         if not told and time.monotonic() - begun_s > _PATIENCE_S:
             told = True
             log.info("loads compiled code; what is not there yet is compiled, which takes a minute or two")
+    gc.collect()
     gc.freeze()
     log.info("ready")
 

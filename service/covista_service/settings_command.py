@@ -1,4 +1,4 @@
-"""`covista-station settings`: every setting there is, as a table; docs/settings.md is what it writes."""
+"""`covista-station settings`: every setting there is, as a table; docs/operations.md has what it writes."""
 
 from __future__ import annotations
 

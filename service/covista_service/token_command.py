@@ -9,6 +9,7 @@ import json
 import re
 from contextlib import closing
 from datetime import UTC, datetime
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
 
@@ -21,6 +22,14 @@ if TYPE_CHECKING:
 
 EXIT_REFUSED = 1
 EXIT_SETTINGS = 2
+
+
+class Allowed(StrEnum):
+    """`access.Scope`, which needs the station's packages."""
+
+    READ = "read"
+    OPERATE = "operate"
+
 
 token = typer.Typer(name="token", no_args_is_help=True, help="Tokens that let clients ask the REST interface.")
 
@@ -35,24 +44,28 @@ NameArgument = Annotated[str, typer.Argument(metavar="NAME", help="Who has it, s
 def add(
     name: NameArgument,
     scope: Annotated[
-        list[Literal["read", "operate"]] | None,
+        list[Allowed] | None,
         typer.Option(help="What it allows; operate includes read; repeatable. [read]"),
     ] = None,
     config: ConfigOption = None,
     database: DatabaseOption = None,
 ) -> None:
     """Make a token and print it: it is shown this once and stored nowhere. A station that runs knows it at once."""
+    from sqlalchemy.engine import make_url
+
     from covista_service.access.scopes import Scope, written
     from covista_service.store.tokens import Tokens
 
-    held = frozenset(map(Scope, scope or ["read"]))
+    held = frozenset(map(Scope, scope or [Allowed.READ]))
     try:
         _check_name(name)
-        with closing(Tokens(_database(config, database))) as tokens:
+        where = _database(config, database)
+        with closing(Tokens(where)) as tokens:
             secret = tokens.add(name, held)
     except CovistaError as error:
         _refuse(error)
-    typer.echo(f"token {name} ({written(held)}); it is not shown again:", err=True)
+    shown = make_url(where).set(query={}).render_as_string(hide_password=True)
+    typer.echo(f"token {name} ({written(held)}) in {shown}; it is not shown again:", err=True)
     typer.echo(secret)
 
 

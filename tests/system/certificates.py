@@ -15,13 +15,14 @@ class Pair:
 
 
 def issue(folder: Path, name: str, *flags: str) -> Pair:
-    """A certificate that signs itself; `name` is its subject."""
+    """A certificate that signs itself; `name` is its subject, and `flags` may ask for another kind of key."""
     pair = Pair(folder / f"{name}.pem", folder / f"{name}.key")
     own = ["-nodes"] if "-passout" not in flags else []
-    request = f"req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -days 2 -subj /CN={name}"
+    key = [] if "-newkey" in flags else ["-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1"]
+    request = f"req -x509 -days 2 -subj /CN={name}"
     places = f"-addext subjectAltName=IP:127.0.0.1,DNS:localhost -keyout {pair.key} -out {pair.cert}"
     subprocess.run(
-        ["openssl", *request.split(), *places.split(), *own, *flags],
+        ["openssl", *request.split(), *places.split(), *key, *own, *flags],
         check=True,
         capture_output=True,
         stdin=subprocess.DEVNULL,

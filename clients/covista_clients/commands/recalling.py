@@ -32,6 +32,8 @@ history = typer.Typer(no_args_is_help=True, help="Say what was: groups, events, 
 
 _MOST = 100
 _PAGE = 100
+# What is passed over comes in pages as large as there are.
+_LARGEST_PAGE = 1000
 _RECENT = timedelta(hours=1)
 _H = TypeVar("_H", GroupsHistory, EventsHistory, PairHistory, RobotTrack)
 
@@ -118,7 +120,7 @@ def track(
 
 def _past(control: MissionControl, after: int | None) -> Iterator[EventReport]:
     start = datetime.now(UTC) - _RECENT if after is None else None
-    for page in control.pages(control.events_history, start, limit=_PAGE):
+    for page in control.pages(control.events_history, start, limit=_LARGEST_PAGE):
         yield from (event for event in page.items if after is None or event.id > after)
 
 

@@ -45,7 +45,11 @@ class Connection:
         transport: httpx.BaseTransport | None,
     ) -> None:
         """Raises ApiError for an address, a token or a file of certificates that cannot be used."""
-        headers = {"Authorization": f"Bearer {token}"} if token else {}
+        given = (token or "").strip()
+        if not (given.isascii() and given.isprintable()):
+            # Nothing of it is told: what is said of a header that cannot be sent would have all of it.
+            raise ApiError("the token holds what no token holds", detail="only printable ASCII can be sent")
+        headers = {"Authorization": f"Bearer {given}"} if given else {}
         trust = _trust(verify)
         try:
             self._client = httpx.Client(
@@ -58,8 +62,6 @@ class Connection:
             )
         except httpx.InvalidURL as error:
             raise ApiError(f"{url!r} is not a URL", detail=str(error)) from error
-        except UnicodeEncodeError as error:
-            raise ApiError("the token holds what no token holds", detail="only ASCII can be sent") from error
         self.timeout_s = timeout_s
         self.closed = threading.Event()
 

@@ -19,7 +19,8 @@ def refusal(response: httpx.Response) -> ApiError:
     """The error that says what the station said, and where it is about access what is needed."""
     title, detail = _said(response)
     status = response.status_code
-    if status in (401, 403):
+    # Where no token would help, such as under a name that is not the station's, it does not ask for one.
+    if status in (401, 403) and "WWW-Authenticate" in response.headers:
         request = response.request
         scope = "read" if request.method in _READING else "operate"
         title = f"{request.method} {request.url.path} needs a token with scope {scope}"

@@ -226,5 +226,6 @@ def _is_unknown(error: zenoh.ReplyError) -> bool:
 
 def has_heard(report: RobotReport, keyframe: KeyframeId) -> bool:
     """Whether the station has received this keyframe or a later one of the same boot, usable or not."""
-    known = (report.heard, report.keyframe)
-    return any(k is not None and k.boot == keyframe.boot and k.sequence >= keyframe.sequence for k in known)
+    # Not `keyframe`: a station that was started anew may remember that one, and has no more of it than its name.
+    heard = report.heard
+    return heard is not None and heard.boot == keyframe.boot and heard.sequence >= keyframe.sequence

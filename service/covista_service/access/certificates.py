@@ -22,8 +22,11 @@ class Certificates:
         self._cert = cert
         self._key = key
         self._seen = self._stamp()
-        # New connections take up what is loaded into it later.
+        self._newest = _load(cert, key)
+        # The one that is served; each connection takes up the newest. What is loaded over a certificate with another
+        # kind of key would not be shown.
         self.context = _load(cert, key)
+        self.context.sni_callback = self._present
 
     def is_changed(self) -> bool:
         """Whether the files are others than those looked at last."""
@@ -33,14 +36,15 @@ class Certificates:
         """Take up what is in the files now; what cannot be used is left alone, and the certificate stays as it was."""
         self._seen = self._stamp()
         try:
-            # On trial first: a certificate whose key is not there yet would be half loaded.
-            _load(self._cert, self._key)
-            _load(self._cert, self._key, self.context)
+            self._newest = _load(self._cert, self._key)
         except CertificateError as error:
             log.warning("the certificate stays as it was: %s", error)
             return False
         log.info("the certificate is renewed")
         return True
+
+    def _present(self, connection: ssl.SSLObject | ssl.SSLSocket, _name: str | None, _served: ssl.SSLContext) -> None:
+        connection.context = self._newest
 
     def _stamp(self) -> tuple[tuple[int, int, int], ...]:
         return tuple(_stamp_of(path) for path in (self._cert, self._key))
@@ -54,17 +58,16 @@ def _stamp_of(path: Path) -> tuple[int, int, int]:
     return (found.st_ino, found.st_size, found.st_mtime_ns)
 
 
-def _load(cert: Path, key: Path, context: ssl.SSLContext | None = None) -> ssl.SSLContext:
+def _load(cert: Path, key: Path) -> ssl.SSLContext:
     """A context with this certificate, of TLS 1.2 or newer. Raises CertificateError."""
     for name, path in (("tls_cert", cert), ("tls_key", key)):
         try:
             path.read_bytes()
         except OSError as error:
             raise CertificateError(f"setting {name}: {path} cannot be read: {error.strerror}") from error
-    if context is None:
-        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-        context.minimum_version = ssl.TLSVersion.TLSv1_2
-        context.set_alpn_protocols(["http/1.1"])
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.minimum_version = ssl.TLSVersion.TLSv1_2
+    context.set_alpn_protocols(["http/1.1"])
     try:
         context.load_cert_chain(cert, key, _no_password)
     except (ssl.SSLError, OSError, ValueError) as error:

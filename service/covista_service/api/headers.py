@@ -19,7 +19,8 @@ _DOCS = (
     "default-src 'none'; script-src 'self' 'unsafe-inline'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
     "connect-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
 )
-_A_YEAR = "max-age=31536000"
+# Browsers hold to it at all ports of the host, and others may serve there without TLS.
+_A_DAY = "max-age=86400"
 
 
 def with_headers(app: ASGIApp) -> ASGIApp:
@@ -43,4 +44,4 @@ def _complete(headers: MutableHeaders, scope: Scope) -> None:
     # What has a version may be kept by who asked, to be asked for again; all else is stale at once, and not for others.
     headers.setdefault("cache-control", "private, no-cache" if "etag" in headers else "no-store")
     if scope["scheme"] == "https":
-        headers.setdefault("strict-transport-security", _A_YEAR)
+        headers.setdefault("strict-transport-security", _A_DAY)

@@ -68,7 +68,11 @@ class Listening(Response):
     async def _listen(self, listener: Listener) -> None:
         until_s = asyncio.get_running_loop().time() + self._stream.longest_s
         position = self._after
-        if position is not None:
+        if position is None:
+            # Whoever loses the connection before the first event knows all the same after which to come back.
+            position = self._stream.last
+            await self._put(b"id: %d\n\n" % position)
+        else:
             async with aclosing(self._past(position)) as past:
                 async for number, text in past:
                     position = number

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+
 from covista_schemas.reports import RobotReport, RobotsReport, RobotTrack
 from fastapi import APIRouter, Response
 
@@ -34,7 +36,8 @@ async def robots(
     """All robots in the order of their ids: presence, group, pose, camera, and what became of their messages."""
     if limit is None and cursor is None:
         return deliver(await parts.texts.robots(snapshot), parts.outgoing, JSON)
-    return answer(answers.robots_page(snapshot, cursor, limit), parts.outgoing)
+    page = await asyncio.to_thread(answers.robots_page, snapshot, cursor, limit)
+    return answer(page, parts.outgoing)
 
 
 @router.get("/{robot}", response_model=RobotReport, responses={**examples.show(examples.ROBOT), **describe(404)})

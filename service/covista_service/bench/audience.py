@@ -97,6 +97,8 @@ class Audience:
                             due_s += period_s / len(self._options.paths)
             except (OSError, TimeoutError, h11.ProtocolError):
                 self._failures += 1
+                await asyncio.sleep(period_s)
+                due_s = time.monotonic()
 
     async def _ask(self, connection: _Connection, path: str, due_s: float) -> None:
         async with asyncio.timeout(_TIMEOUT_S):

@@ -22,6 +22,8 @@ from covista_service.demo import children
 
 MOST_READ_MS = 50.0
 MOST_MATRIX_MS = 100.0
+# A client that hangs has no time.
+LEAST_ANSWERED = 0.9
 ROBOTS, OTHERS, CLIENTS = 20, 80, 50
 CROWD = 1000
 _GROUPS, _ROBOTS, _MATRIX = "/api/v1/groups", "/api/v1/robots", "/api/v1/similarity"
@@ -38,6 +40,7 @@ def rows(long: bool) -> Iterator[Row]:
     quiet, pressed = reads(seconds, ROBOTS, OTHERS, CLIENTS)
     for case, path in (("groups_p99", _GROUPS), ("robots_p99", _ROBOTS)):
         p99_ms = quantile(pressed.times_ms[path], 0.99)
+        answered = len(pressed.times_ms[path]) / (CLIENTS * seconds)
         yield Row(
             bench="rest",
             case=case,
@@ -47,7 +50,7 @@ def rows(long: bool) -> Iterator[Row]:
             peer="p99 of one client of a quiet station",
             peer_median=quantile(quiet.times_ms[path], 0.99),
             mark=f"<= {MOST_READ_MS:g} ms, all answered",
-            holds=p99_ms <= MOST_READ_MS and not pressed.failures,
+            holds=p99_ms <= MOST_READ_MS and not pressed.failures and answered >= LEAST_ANSWERED,
         )
     times_ms = matrix_ms(CROWD, _ROUNDS)
     yield Row(

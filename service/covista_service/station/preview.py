@@ -18,9 +18,10 @@ from covista_service.station.snapshot import GroupsView, GroupView, Snapshot
 
 
 def preview(snapshot: Snapshot, options: GroupingOptions) -> GroupsView:
-    """The groups that the station would show if these settings were given now, under the revision that is on show.
+    """The groups that these settings would propose now if no groups stood, under the revision that is on show.
 
-    As when settings are given, nothing holds on to the groups on show, but labels follow them; new ones have numbers
+    As when other settings are given, nothing holds on to the groups on show, so those in force may propose others than
+    hysteresis lets stand. Labels follow the groups on show; new ones have numbers
     that were never used. Raises ValueError for an alpha or a sigma that is none.
     """
     shown, view = snapshot.groups, snapshot.similarity

@@ -74,7 +74,6 @@ class Robot:
             boot=known.boot,
             boot_heard_ns=seen_ns,
             fix=None if known.pose is None else Fix(known.pose, known.pose_time_ns, known.boot or ""),
-            announced=None if keyframe is None else keyframe.id,
             arrived=keyframe,
             remembered=keyframe,
         )

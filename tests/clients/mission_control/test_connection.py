@@ -135,9 +135,8 @@ def test_a_refusal_says_what_is_needed(
     status: int, kind: type[ApiError], ask: Callable[[MissionControl], object], said: str
 ) -> None:
     problem = Problem(title="Slow down", status=status, detail="because").model_dump_json()
-    transport = httpx.MockTransport(
-        lambda request: httpx.Response(status, content=problem, headers={"Retry-After": "7"})
-    )
+    headers = {"Retry-After": "7"} | ({"WWW-Authenticate": "Bearer"} if status in (401, 403) else {})
+    transport = httpx.MockTransport(lambda request: httpx.Response(status, content=problem, headers=headers))
     with MissionControl(token="secret", transport=transport) as control, pytest.raises(kind) as caught:
         ask(control)
     assert str(caught.value).startswith(said)
@@ -183,3 +182,29 @@ def test_a_file_that_tells_of_nobody_is_an_api_error(tmp_path: Path) -> None:
     for name in ("empty.pem", "absent.pem"):
         with pytest.raises(ApiError, match=name):
             MissionControl("https://127.0.0.1", verify=tmp_path / name)
+
+
+def test_who_is_refused_for_another_reason_is_not_sent_for_a_token() -> None:
+    problem = Problem(title="Another host", status=403).model_dump_json()
+    transport = httpx.MockTransport(lambda request: httpx.Response(403, content=problem))
+    with MissionControl(transport=transport) as control, pytest.raises(ForbiddenError, match="Another host"):
+        control.groups()
+
+
+def test_a_token_from_a_file_may_end_with_its_line() -> None:
+    asked: list[str] = []
+
+    def answer(request: httpx.Request) -> httpx.Response:
+        asked.append(request.headers["authorization"])
+        return httpx.Response(200, content=sample.ROBOTS.model_dump_json())
+
+    with MissionControl(token=" secret\n", transport=httpx.MockTransport(answer)) as control:
+        control.robots()
+    assert asked == ["Bearer secret"]
+
+
+@pytest.mark.parametrize("token", ["sec\nret", "sec\x00ret", "secrét"])
+def test_a_token_that_cannot_be_sent_is_not_told(token: str) -> None:
+    with pytest.raises(ApiError, match="the token holds what no token holds") as caught:
+        MissionControl(token=token)
+    assert "sec" not in f"{caught.value}{caught.value.detail}"

@@ -8,7 +8,7 @@ import pytest
 from covista_clients import MissionControl
 from covista_clients.mission_control import events as events_module
 from covista_clients.mission_control.connection import ATTEMPTS
-from covista_schemas.errors import ApiError, ForbiddenError
+from covista_schemas.errors import ApiError, ForbiddenError, UnauthorizedError
 from covista_schemas.reports import EventReport, Problem
 
 from tests.clients.event_server import DEADLINE_S, Teller, cut, event, telling
@@ -201,7 +201,7 @@ def test_a_refusal_later_on_is_an_error_too() -> None:
     with telling(say(*wire(1)), lambda teller: teller.refuse(401)) as server, MissionControl(server.url) as control:
         events = control.events()
         take(events, 1)
-        with pytest.raises(ApiError, match="scope read"):
+        with pytest.raises(UnauthorizedError):
             next(events)
 
 
@@ -214,3 +214,14 @@ def page(teller: Teller) -> None:
 def test_what_is_no_station_is_an_error(tell: object) -> None:
     with telling(tell) as server, MissionControl(server.url) as control, pytest.raises(ApiError, match="as a station"):
         next(control.events())
+
+
+def test_who_loses_the_stream_before_the_first_event_comes_back_with_where_it_began() -> None:
+    with (
+        telling(say(b": \n\nid: 7\n\n"), say(*wire(8))) as server,
+        MissionControl(server.url) as control,
+    ):
+        events = control.events()
+        take(events, 1)
+        assert events.last_event_id == "8"
+    assert server.asked[:2] == [None, "7"]

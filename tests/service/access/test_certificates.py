@@ -106,3 +106,11 @@ def test_what_cannot_be_used_is_one_line(folder: Path, first: Pair, second: Pair
         with pytest.raises(CertificateError, match=said) as caught:
             Certificates(cert, key)
         assert "\n" not in str(caught.value)
+
+
+def test_one_with_another_kind_of_key_is_shown_once_it_is_there(folder: Path, used: Pair) -> None:
+    certificates = Certificates(used.cert, used.key)
+    for other in (issue(folder, "of-rsa", "-newkey", "rsa:2048"), issue(folder, "of-ec")):
+        put(other, used)
+        assert certificates.renew()
+        assert shown_by(certificates) == der(other)

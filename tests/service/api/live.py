@@ -160,6 +160,8 @@ class Ear:
         lines = iter(self._file.readline, b"\r\n")
         self.headers = dict(line.decode().strip().lower().split(": ", 1) for line in lines)
         self.comments = 0
+        # The id that the stream began with.
+        self.at: int | None = None
 
     def __enter__(self) -> "Ear":
         return self
@@ -178,7 +180,10 @@ class Ear:
             elif text:
                 name, _, value = text.partition(": ")
                 fields[name] = value
-            elif fields:
+            elif "data" not in fields:
+                # An id alone is no event: it is what to come back with.
+                self.at = int(fields.pop("id"))
+            else:
                 number = fields.get("id")
                 return Heard(None if number is None else int(number), fields["event"], json.loads(fields["data"]))
         return None

@@ -251,6 +251,8 @@ def test_nobody_listens_for_ever_without_asking_anew(tmp_path: Path) -> None:
     with site(tmp_path, Stream(longest_s=0.2)) as station, Ear(station) as ear:
         (cut,) = ear.rest()
         assert (cut.event, cut.data["title"]) == ("cut", "Listened for long enough")
+        # Who has heard of nothing yet knows all the same where to come back to.
+        assert ear.at == station.parts.stream.last
 
 
 def test_all_streams_end_with_a_last_word_when_the_station_stops(station: Site) -> None:

@@ -225,3 +225,17 @@ def test_a_robot_is_forgotten_with_who_wanted_it(desk: Desk, notebook: Notebook,
     events = [event for news in notebook.news for event in news.events if event.event is EventKind.STATUS]
     assert [(event.by, event.robots) for event in events] == [("ada", ["r1"])]
     assert desk.ask("/api/v1/robots/r1", "DELETE", **may).status_code == 404
+
+
+def test_what_was_refused_for_want_of_a_turn_is_not_done_later(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    loop = desk.parts.loop
+    with monkeypatch.context() as patch:
+        patch.setattr("covista_service.loop.DO_TIMEOUT_S", 0.05)
+        patch.setattr(loop, "turn", lambda: False)
+        assert desk.send("PATCH", "/settings", {"alpha": 0.9}).status_code == 503
+        assert desk.ask("/api/v1/robots/r1", "DELETE").status_code == 503
+    before = desk.get("/settings").json()
+    loop.turn()
+    assert desk.get("/settings").json() == before
+    assert before["alpha"] != 0.9
+    assert desk.get("/robots/r1").status_code == 200
