@@ -180,10 +180,10 @@ class Ear:
             elif text:
                 name, _, value = text.partition(": ")
                 fields[name] = value
-            elif "data" not in fields:
+            elif fields.keys() == {"id"}:
                 # An id alone is no event: it is what to come back with.
                 self.at = int(fields.pop("id"))
-            else:
+            elif fields:
                 number = fields.get("id")
                 return Heard(None if number is None else int(number), fields["event"], json.loads(fields["data"]))
         return None
