@@ -63,6 +63,8 @@ CODES = (
 MAX_POSE_BYTES = 16 * 1024
 # As much as zenoh hands over in one piece.
 MAX_KEYFRAME_BYTES = 4 * 1024 * 1024
+# The wire has room for twice as many, but databases do not.
+MAX_SEQUENCE = 2**63 - 1
 
 _M = TypeVar("_M", bound=Message)
 _Vector = tuple[float, float, float]
@@ -112,7 +114,7 @@ def decode_keyframe(data: bytes, *, robot: str | None = None) -> Keyframe:
     """The keyframe in `data`; with `robot`, the id inside must be that of the key. Raises DecodeError."""
     check_size(len(data), MAX_KEYFRAME_BYTES)
     message = _parse(pb.Keyframe(), data)
-    _check_sender(message.robot, message.boot, robot)
+    _check_name(message, robot)
     camera = _decode_camera(message.camera)
     pose = _decode_pose(message, tuple(message.covariance))
     image: bytes | None = None
@@ -133,7 +135,7 @@ def decode_pose(data: bytes, *, robot: str | None = None) -> PoseUpdate:
     """The pose in `data`; with `robot`, the id inside must be that of the key. Raises DecodeError."""
     check_size(len(data), MAX_POSE_BYTES)
     message = _parse(pb.Pose(), data)
-    _check_sender(message.robot, message.boot, robot)
+    _check_name(message, robot)
     pose = _decode_pose(message, tuple(message.covariance))
     return PoseUpdate(message.robot, message.boot, message.sequence, pose)
 
@@ -158,7 +160,7 @@ def check_size(size: int, most: int) -> None:
 
 def _peek(message: pb.Keyframe | pb.Pose, data: bytes, robot: str | None) -> tuple[str, str, int]:
     _parse(message, data)
-    _check_sender(message.robot, message.boot, robot)
+    _check_name(message, robot)
     return message.robot, message.boot, message.sequence
 
 
@@ -171,14 +173,16 @@ def _parse(message: _M, data: bytes) -> _M:
     return message
 
 
-def _check_sender(robot: str, boot: str, expected: str | None) -> None:
-    for field, value in (("robot", robot), ("boot", boot)):
+def _check_name(message: pb.Keyframe | pb.Pose, expected: str | None) -> None:
+    for field, value in (("robot", message.robot), ("boot", message.boot)):
         try:
             keys.check_id(value, field)
         except KeyExpressionError as error:
             raise DecodeError(WRONG_ID, field, str(error)) from error
-    if expected is not None and robot != expected:
-        raise DecodeError(WRONG_ID, "robot", f"{robot!r} inside, but {expected!r} in the key")
+    if expected is not None and message.robot != expected:
+        raise DecodeError(WRONG_ID, "robot", f"{message.robot!r} inside, but {expected!r} in the key")
+    if message.sequence > MAX_SEQUENCE:
+        raise DecodeError(MALFORMED, "sequence", f"{message.sequence}, more than {MAX_SEQUENCE}")
 
 
 def _taken(update: PoseUpdate) -> pb.Keyframe:

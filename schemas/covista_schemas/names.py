@@ -45,7 +45,8 @@ class NameReader:
         boot = message.boot
         if boot not in self._boots and not self._learn(boot):
             return codec.WRONG_ID
-        return boot, message.sequence
+        sequence = message.sequence
+        return codec.MALFORMED if sequence > codec.MAX_SEQUENCE else (boot, sequence)
 
     def complain(self, data: bytes, robot: str) -> str:
         """What is wrong with a message that could not be read, in words."""

@@ -14,7 +14,7 @@ from covista_schemas.messages import (
 from hypothesis import strategies as st
 
 ids = st.from_regex(r"[a-z0-9][a-z0-9_-]{0,62}", fullmatch=True)
-sequences = st.integers(0, 2**64 - 1)
+sequences = st.integers(0, 2**63 - 1)
 numbers = st.floats(-1e6, 1e6)
 coordinates = st.floats(-1e12, 1e12)
 times_ns = st.integers(-(2**63), 2**63 - 1)

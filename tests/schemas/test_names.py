@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 ROBOTS = st.sampled_from(["r1", "r2", "R1", "", "r" * 64, "ü"])
 BOOTS = st.sampled_from(["b0", "b1", "", "Boot!", "b" * 63, "b" * 64])
-NUMBERS = st.integers(0, 2**64 - 1)
+NUMBERS = st.one_of(st.integers(0, 2**64 - 1), st.sampled_from([2**63 - 1, 2**63]))
 
 
 @st.composite
@@ -75,6 +75,9 @@ def test_what_is_wrong_is_said_in_the_words_of_the_codec() -> None:
     assert reader.complain(stranger, "r1") == "robot: 'r2' inside, but 'r1' in the key"
     assert reader.read(bytes(codec.MAX_POSE_BYTES + 1), "r1") == codec.TOO_LARGE
     assert "more than the 16384 that it may" in reader.complain(bytes(codec.MAX_POSE_BYTES + 1), "r1")
+    endless = pb.Pose(robot="r1", boot="b0", sequence=2**63).SerializeToString()
+    assert reader.read(endless, "r1") == codec.MALFORMED
+    assert reader.complain(endless, "r1") == "sequence: 9223372036854775808, more than 9223372036854775807"
 
 
 @pytest.fixture

@@ -64,6 +64,8 @@ class History:
         self._busy_s: float | None = None
         self._pause_s = 0.0
         self._more = False
+        # Snapshots in a row that could not be stored for what they are.
+        self._unremembered = 0
         self.last = self._used = self._start()
         self._thread = threading.Thread(target=self._run, name="covista-history", daemon=True)
         self._thread.start()
@@ -131,6 +133,8 @@ class History:
         """Whether it writes."""
         with self._changed:
             lost = f"; {self._backlog.lost} entries lost" if self._backlog.lost else ""
+            if self._unremembered:
+                lost += f"; {self._unremembered} states in a row for the next station could not be stored"
             problem = self._problem
             if self._busy_s is not None and time.monotonic() - self._busy_s > SLOW_S:
                 problem = problem or "the database takes long to answer"
@@ -213,7 +217,7 @@ class History:
             while self._write():
                 pass
             if snapshot is not None:
-                self._writer.remember(snapshot)
+                self._remember(snapshot)
             self._more = self._writer.tidy()
             if closing:
                 self._writer.end()
@@ -230,6 +234,21 @@ class History:
             self._recover()
         finally:
             self._busy_s = None
+
+    def _remember(self, snapshot: Snapshot) -> None:
+        """Keep the snapshot; one that cannot be stored for what it is must not end all else, such as retention."""
+        try:
+            self._writer.remember(snapshot)
+        except Exception as error:
+            if is_passing(error):
+                raise
+            self._unremembered += 1
+            if self._unremembered == 1:
+                log.exception("the state for the next station cannot be stored", extra=about(said=first_line(error)))
+        else:
+            if self._unremembered:
+                log.info("the state for the next station is stored again", extra=about(missed=self._unremembered))
+            self._unremembered = 0
 
     def _write(self) -> bool:
         """Write the next batch; False if there is none, nor a gap to be marked."""

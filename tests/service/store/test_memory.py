@@ -83,6 +83,26 @@ def test_what_is_recalled_is_what_stood(url: str) -> None:
         assert same(history.recall(FOR_EVER_S, FOR_EVER_S), remember(scene.snapshot))
 
 
+def test_a_state_that_cannot_be_stored_ends_neither_retention_nor_the_history(url: str) -> None:
+    scene = swarm()
+    scene.send("r0", pose(), sequence=2**63)
+    with kept(url) as history:
+        history.follow(lambda: scene.snapshot)
+        wait_until(lambda: "states in a row" in str(history.health().detail))
+        history.take(News(scene.snapshot, (), True, ()))
+        assert history.flush(10)
+        tidied_s = history._writer._size_s
+        wait_until(lambda: history._writer._size_s > tidied_s)
+        assert history.health().status == "ready"
+        scene.receive(ForgetRobot("r0"))
+        wait_until(lambda: "states in a row" not in str(history.health().detail))
+        remembered(history, scene)
+    # It ended in peace: numbers that were not used are given back.
+    with kept(url) as history:
+        assert history.last.revision == scene.snapshot.groups.revision
+        assert same(history.recall(FOR_EVER_S, FOR_EVER_S), remember(scene.snapshot))
+
+
 def test_what_has_changed_is_recalled_as_it_is_now(url: str) -> None:
     scene = swarm()
     with kept(url) as history:
