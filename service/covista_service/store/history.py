@@ -14,7 +14,7 @@ from covista_service.loop import News, SinkStatus
 from covista_service.station.memory import Memory
 from covista_service.station.snapshot import Snapshot
 from covista_service.store.backlog import Backlog
-from covista_service.store.database import UNUSABLE, first_line, is_passing
+from covista_service.store.database import UNUSABLE, DatabaseError, first_line, is_passing
 from covista_service.store.numbers import LastNumbers
 from covista_service.store.retention import Retention
 from covista_service.store.rows import Entry, SettingsChange
@@ -28,6 +28,9 @@ BATCH = 2000
 FIRST_PAUSE_S = 0.1
 LONGEST_PAUSE_S = 5.0
 PERIOD_S = 1.0
+# A database that starts together with the station is waited for so long: it has the numbers and settings to go on with.
+START_S = 15.0
+_LONGEST_START_PAUSE_S = 1.0
 # Whoever closes waits so long.
 CLOSE_S = 2.0
 # A database that takes longer for one batch is worth a word.
@@ -47,8 +50,12 @@ class History:
         queue: int = QUEUE,
         first_pause_s: float = FIRST_PAUSE_S,
         period_s: float = PERIOD_S,
+        start_s: float = START_S,
     ) -> None:
-        """Open the database, if it can be. Raises DatabaseError for a URL that no engine can be made of."""
+        """Open the database, if it can be within `start_s`, and one try more.
+
+        Raises DatabaseError for a URL that no engine can be made of.
+        """
         self._writer = Writer(url, retention or Retention())
         self._backlog = Backlog(queue)
         self._first_pause_s, self._period_s = first_pause_s, period_s
@@ -66,7 +73,7 @@ class History:
         self._more = False
         # Snapshots in a row that could not be stored for what they are.
         self._unremembered = 0
-        self.last = self._used = self._start()
+        self.last = self._used = self._start(start_s)
         self._thread = threading.Thread(target=self._run, name="covista-history", daemon=True)
         self._thread.start()
 
@@ -151,12 +158,23 @@ class History:
         if self._thread.is_alive():
             log.warning("the history ends without its database", extra=about(lost=self.status().waiting))
 
-    def _start(self) -> LastNumbers:
-        try:
-            return self._writer.start()
-        except UNUSABLE as error:
-            self._fail(error)
-            return LastNumbers()
+    def _start(self, start_s: float) -> LastNumbers:
+        """Where the database ends; who goes on without it begins at 1, so one that is only away is waited for."""
+        give_up_s, pause_s = time.monotonic() + start_s, self._first_pause_s
+        while True:
+            try:
+                last = self._writer.start()
+            except UNUSABLE as error:
+                self._fail(error)
+                lasting = isinstance(error, DatabaseError) or not is_passing(error)
+                if lasting or time.monotonic() + pause_s > give_up_s:
+                    log.warning("the station starts without its database", extra=about(said=first_line(error)))
+                    return LastNumbers()
+            else:
+                self._recover()
+                return last
+            time.sleep(pause_s)
+            pause_s = min(_LONGEST_START_PAUSE_S, 2 * pause_s)
 
     def _run(self) -> None:
         try:

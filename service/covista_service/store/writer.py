@@ -45,7 +45,7 @@ class Writer:
         self._clock = clock
         self._size = size_of(self._engine)
         self._present = Present()
-        self._open = self.continues = False
+        self._open = self.continues = self._is_late = False
         self._begun_us: int | None = None
         self._removed: Loss | None = None
         self._reserved = self._used = LastNumbers()
@@ -62,8 +62,15 @@ class Writer:
 
     def open(self) -> None:
         """Bring the database up to date, and reserve numbers above those in use."""
-        with self._opening():
-            pass
+        with self._opening() as last:
+            strange = not self.continues and not self._is_late and last.over(self._used) != self._used
+        if strange:
+            # What was told with our numbers is told; those from another state stay beside them.
+            log.warning(
+                "the database was away when the station started: revisions, events and labels stand in it twice",
+                extra=about(revision=last.revision, event=last.event, label=last.label),
+            )
+        self._is_late = not self.continues
 
     def write(self, batch: Sequence[Entry], loss: Loss | None, reason: str, used: LastNumbers) -> None:
         """Append entries, and a gap for what is missing; numbers up to `used` are."""

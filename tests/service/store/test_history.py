@@ -27,7 +27,9 @@ FOR_EVER = Retention(days=36_500)
 
 @contextmanager
 def kept(url: str, **options: object) -> Iterator[History]:
-    history = History(url, **{"retention": FOR_EVER, "first_pause_s": QUICK_S, "period_s": 0.02, **options})
+    history = History(
+        url, **{"retention": FOR_EVER, "first_pause_s": QUICK_S, "period_s": 0.02, "start_s": 0.0, **options}
+    )
     try:
         yield history
     finally:

@@ -5,6 +5,8 @@ import signal
 import subprocess
 import sys
 import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -219,6 +221,58 @@ def test_numbering_goes_on_where_it_ended_in_peace(url: str) -> None:
         assert history.last == LastNumbers(groups.revision, news.events[-1].id, groups.last_label)
         assert groups.revision > 0
         assert groups.last_label > 0
+
+
+def test_a_database_that_comes_soon_after_the_station_is_waited_for(
+    file: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    url, news = f"sqlite:///{file}", news_of(two_robots())
+    with kept(url) as history:
+        history.take(news)
+    away = file.parent.rename(file.parent.with_name("away"))
+
+    def come_back() -> None:
+        wait_until(lambda: "waits for its database" in caplog.text)
+        away.rename(file.parent)
+
+    with ThreadPoolExecutor(1) as pool:
+        back = pool.submit(come_back)
+        with kept(url, start_s=10.0) as history:
+            assert history.last.event == news.events[-1].id
+            assert history.health().status == "ready"
+        back.result()
+    assert "starts without" not in caplog.text
+
+
+def test_a_database_that_comes_late_is_written_and_a_warning_says_what_stands_twice(
+    file: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    url, news = f"sqlite:///{file}", news_of(two_robots())
+    with kept(url) as history:
+        history.take(news)
+    away = file.parent.rename(file.parent.with_name("away"))
+    with kept(url, start_s=0.05) as history:
+        assert history.last == LastNumbers()
+        assert "starts without its database" in caplog.text
+        away.rename(file.parent)
+        history.take(news)
+        assert history.flush(10)
+    assert caplog.text.count("stand in it twice") == 1
+    # Both stand there, and the next station begins above all that may have been used.
+    assert ask(url, "select count(*) from events") == [(2 * len(news.events),)]
+    with kept(url) as history:
+        assert history.last.event > news.events[-1].id
+
+
+def test_a_database_of_a_newer_version_is_not_waited_for(file: Path) -> None:
+    url = f"sqlite:///{file}"
+    with kept(url):
+        pass
+    ask(url, "update alembic_version set version_num = 'ffff' returning 1")
+    began_s = time.monotonic()
+    with kept(url, start_s=30.0) as history:
+        assert time.monotonic() - began_s < 10
+        assert "newer version" in str(history.health().detail)
 
 
 def test_numbers_of_a_database_of_the_first_version_are_not_used_again(url: str) -> None:
