@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import logging
+import time
+from collections.abc import Callable, Iterable
+from math import inf
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
-from sqlalchemy import Engine, func, literal, select, text
+from sqlalchemy import Engine, Table, func, literal, select, text
 
-from covista_service.store.database import file_of
+from covista_service.store.database import UNUSABLE, file_of, first_line
 from covista_service.store.retention import PAST, drop_oldest
 from covista_service.store.tables import metadata
+from covista_service.telemetry import about
 
 # What is left for SQLite's log, which is cut back to 1 MB when it has been written into the file.
 _MARGIN_BYTES = 4_000_000
@@ -17,8 +22,12 @@ _MARGIN_BYTES = 4_000_000
 _PAGES = 256
 # How long PostgreSQL may take to make room that rows have left fit for new ones.
 _VACUUM_S = 20.0
+# A table that could not be vacuumed is tried again after so long.
+_AGAIN_S = 60.0
 # Tables of the server are this much shorter after one look, as far as they are too large.
 _STEPS = 8
+
+log = logging.getLogger(__name__)
 
 
 @runtime_checkable
@@ -69,40 +78,66 @@ class FileSize:
 class ServerSize:
     """PostgreSQL: the tables with their indexes. Room that rows have left is used again, but seldom given back.
 
-    So the oldest go when the tables grow beyond the limit, and again only when they grow further.
+    So the oldest go when the tables grow beyond the limit, and again only when they grow further. Rows that went leave
+    no room before a table is vacuumed, which is done to one table at a look: until all are, nothing else goes.
     """
 
-    def __init__(self, engine: Engine) -> None:
+    def __init__(self, engine: Engine, clock_s: Callable[[], float] = time.monotonic) -> None:
         self._engine = engine
+        self._clock_s = clock_s
         self._floor_bytes = 0
+        self._due: list[Table] = []
+        self._again_s = -inf
 
     def fit(self, limit_bytes: int) -> bool:
         """Take one step towards the limit, if it is exceeded; True if another one is needed."""
-        if self._taken() <= max(limit_bytes, self._floor_bytes):
-            return False
-        removed = False
-        for _ in range(_STEPS):
-            with self._engine.begin() as connection:
-                removed = drop_oldest(connection) or removed
-        self._vacuum()
+        if self._due:
+            if self._clock_s() < self._again_s:
+                return False
+        else:
+            taken = self._taken()
+            if taken <= max(limit_bytes, self._floor_bytes):
+                return False
+            # Whatever comes of the steps: they are not taken again before it grows further.
+            self._floor_bytes = taken
+            self._shorten()
+        if self._vacuum(self._due[-1]):
+            self._due.pop()
+        else:
+            self._again_s = self._clock_s() + _AGAIN_S
         self._floor_bytes = self._taken()
         return False
 
-    def _taken(self) -> int:
-        total = sum((func.pg_total_relation_size(name) for name in metadata.tables), literal(0))
+    def _shorten(self) -> None:
+        # The largest comes last, and is vacuumed first.
+        self._due = sorted(PAST, key=lambda table: self._taken([table.name]))
+        for _ in range(_STEPS):
+            with self._engine.begin() as connection:
+                if not drop_oldest(connection):
+                    return
+
+    def _taken(self, names: Iterable[str] = tuple(metadata.tables)) -> int:
+        total = sum((func.pg_total_relation_size(name) for name in names), literal(0))
         with self._engine.begin() as connection:
             return int(connection.execute(select(total)).scalar_one())
 
-    def _vacuum(self) -> None:
-        with self._engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
-            driver = connection.connection.driver_connection
-            connection.execute(text(f"SET statement_timeout = {round(1000 * _VACUUM_S)}"))
-            if isinstance(driver, Patient):
-                driver.patience_s = _VACUUM_S
-            for table in PAST:
-                connection.execute(text(f"VACUUM {table.name}"))
-            # Its timeouts are not those of the others.
-            connection.invalidate()
+    def _vacuum(self, table: Table) -> bool:
+        """Make the room fit for new rows; False if that fails, or takes too long."""
+        try:
+            with self._engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
+                driver = connection.connection.driver_connection
+                try:
+                    connection.execute(text(f"SET statement_timeout = {round(1000 * _VACUUM_S)}"))
+                    if isinstance(driver, Patient):
+                        driver.patience_s = _VACUUM_S
+                    connection.execute(text(f"VACUUM {table.name}"))
+                finally:
+                    # Its timeouts are not those of the others.
+                    connection.invalidate()
+        except UNUSABLE as error:
+            log.warning("a table cannot be vacuumed", extra=about(table=table.name, said=first_line(error)))
+            return False
+        return True
 
 
 def _size_of_log(file: Path | None) -> int:

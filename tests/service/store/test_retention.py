@@ -12,7 +12,7 @@ from covista_service.store.migrations import upgrade
 from covista_service.store.numbers import LastNumbers
 from covista_service.store.retention import Retention, drop_older, drop_oldest, drop_superseded
 from covista_service.store.rows import PairEntry, SettingsChange, TrackEntry
-from covista_service.store.size import size_of
+from covista_service.store.size import ServerSize, size_of
 from covista_service.store.tables import events, group_revisions, tracks
 from covista_service.store.writer import Writer
 from sqlalchemy import Engine, func, select, text
@@ -156,6 +156,46 @@ def test_a_server_does_not_grow_far_beyond_its_limit(server: object) -> None:
     size._engine.dispose()
     assert max(sizes) <= 1.3 * retention.limit_bytes
     assert min(sizes[75:]) >= 0.5 * retention.limit_bytes
+
+
+def test_a_server_that_cannot_vacuum_loses_no_more_than_one_look_takes(
+    server: object, caplog: pytest.LogCaptureFixture
+) -> None:
+    engine, now_s = open_engine(server.new_database()), 0.0
+    with engine.begin() as connection:
+        upgrade(connection)
+    size = ServerSize(engine, lambda: now_s)
+
+    def grow(begun: int) -> None:
+        put(engine, *(TrackEntry("r1", us(begun + second), WAY) for second in range(20_000)))
+
+    def rows() -> int:
+        with engine.begin() as connection:
+            return int(connection.execute(select(func.count()).select_from(tracks)).scalar_one())
+
+    grow(0)
+    with engine.begin() as lock:
+        # Rows come and go, but nobody vacuums.
+        lock.execute(text("lock table tracks in share update exclusive mode"))
+        assert not size.fit(1000)
+        left = rows()
+        assert 0 < left < 20_000
+        for look in range(5):
+            now_s += 1.0
+            grow(20_000 * (look + 1))
+            assert not size.fit(1000)
+            assert rows() == left + 20_000 * (look + 1)
+    assert caplog.text.count("cannot be vacuumed") == 1
+    # Free again: first room is made, table by table, and only then the oldest go.
+    now_s += 100.0
+    for _ in range(5):
+        size.fit(1000)
+        assert rows() == left + 100_000
+    assert not size._due
+    grow(120_000)
+    size.fit(1000)
+    assert rows() < left + 120_000
+    engine.dispose()
 
 
 def test_a_gap_is_kept_as_long_as_what_it_is_of(engine: Engine, url: str) -> None:
