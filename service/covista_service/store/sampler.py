@@ -115,6 +115,14 @@ class Sampler:
                     del self._moments[pair]
                 if (entry.overlap_a, entry.overlap_b) != told.overlaps:
                     yield entry
+        yield from self._forgotten(snapshot, time_us)
+
+    def _forgotten(self, snapshot: Snapshot, time_us: int) -> Iterator[PairEntry]:
+        """Pairs that had parted before one of the robots was forgotten: nothing is known of them any more."""
+        robots = snapshot.robots
+        for a, b in [(a, b) for a, b in self._moments if a not in robots or b not in robots]:
+            if self._moments.pop((a, b)).overlaps is not None:
+                yield PairEntry(a, b, time_us, None, None, FoundBy.UNKNOWN)
 
     def _tell(self, snapshot: Snapshot, pair: Pair, record: PairRecord | None, time_us: int) -> PairEntry:
         a, b = pair

@@ -143,6 +143,27 @@ def test_a_robot_that_is_forgotten_leaves_its_overlaps_unknown_and_comes_back_as
     assert len(moments(entries)) == 1
 
 
+def test_pairs_that_parted_are_forgotten_with_their_robots() -> None:
+    scene, sampler = Scene(), Sampler()
+    scene.send("r0")
+    for number in range(1, 6):
+        visitor = f"v{number}"
+        scene.send(visitor)
+        scene.settle()
+        assert len(moments(sampler.look(scene.snapshot))) == 1
+        # Back to back: their views cannot meet, and no record is kept.
+        scene.now_ns += S
+        scene.send(visitor, pose(1e3, BACK))
+        scene.settle(lambda job: NOTHING)
+        assert ("r0", visitor) not in scene.snapshot.records
+        assert moments(sampler.look(scene.snapshot)) == [("r0", visitor, 0.0, 0.0)]
+        scene.receive(ForgetRobot(visitor))
+        scene.tick()
+        assert moments(sampler.look(scene.snapshot)) == [("r0", visitor, None, None)]
+        assert sampler.look(scene.snapshot) == []
+        assert sampler._moments == {}
+
+
 def test_the_same_snapshot_is_no_news() -> None:
     scene, sampler = Scene(), Sampler()
     for number in range(5):
