@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from covista_service.store.rows import Entry, PairEntry, TrackEntry, time_us_of
 
@@ -19,11 +19,9 @@ class Loss:
     until_us: int
     lost: int
 
-    def and_of(self, time_us: int) -> Loss:
-        """With one more."""
-        return replace(
-            self, since_us=min(time_us, self.since_us), until_us=max(time_us, self.until_us), lost=self.lost + 1
-        )
+    def and_of(self, other: Loss) -> Loss:
+        """Both as one."""
+        return Loss(min(self.since_us, other.since_us), max(self.until_us, other.until_us), self.lost + other.lost)
 
 
 class Backlog:
@@ -56,14 +54,22 @@ class Backlog:
         """The next entries; whoever takes them says that they are `written`, `put_back`, or `lose`s them."""
         return [self._next() for _ in range(min(limit, len(self)))]
 
-    def written(self, batch: Sequence[Entry], loss: Loss | None) -> None:
-        """These are in the database, and so is what was known to be missing."""
-        self.told_went += _told_of(batch)
-        if loss is not None and self._loss is loss:
-            self._loss = None
+    def take_loss(self) -> Loss | None:
+        """What is missing and not yet in the database as a gap; it is `put_back` where the gap cannot be written.
 
-    def put_back(self, batch: Sequence[Entry]) -> None:
-        """These could not be written; they are still the next ones."""
+        What goes missing meanwhile is another gap's.
+        """
+        loss, self._loss = self._loss, None
+        return loss
+
+    def written(self, batch: Sequence[Entry]) -> None:
+        """These are in the database."""
+        self.told_went += _told_of(batch)
+
+    def put_back(self, batch: Sequence[Entry], loss: Loss | None = None) -> None:
+        """These could not be written; they are still the next ones, and what is missing is missing still."""
+        if loss is not None:
+            self._miss(loss)
         for entry in reversed(batch):
             (self._sampled if isinstance(entry, Sampled) else self._told).appendleft(entry)
         self._fit()
@@ -72,16 +78,14 @@ class Backlog:
         """These will never be written."""
         for entry in entries:
             time_us = time_us_of(entry)
-            self._loss = Loss(time_us, time_us, 1) if self._loss is None else self._loss.and_of(time_us)
+            self._miss(Loss(time_us, time_us, 1))
             self.lost += 1
             told = not isinstance(entry, Sampled)
             self.told_went += told
             self.told_lost += told
 
-    @property
-    def loss(self) -> Loss | None:
-        """What is missing and not yet in the database as a gap."""
-        return self._loss
+    def _miss(self, loss: Loss) -> None:
+        self._loss = loss if self._loss is None else self._loss.and_of(loss)
 
     def _next(self) -> Entry:
         return self._told.popleft() if self._told else self._sampled.popleft()

@@ -13,7 +13,7 @@ from covista_service import answers
 from covista_service.loop import News, SinkStatus
 from covista_service.station.memory import Memory
 from covista_service.station.snapshot import Snapshot
-from covista_service.store.backlog import Backlog
+from covista_service.store.backlog import Backlog, Loss
 from covista_service.store.database import UNUSABLE, DatabaseError, first_line, is_passing
 from covista_service.store.numbers import LastNumbers
 from covista_service.store.retention import Retention
@@ -271,7 +271,7 @@ class History:
     def _write(self) -> bool:
         """Write the next batch; False if there is none, nor a gap to be marked."""
         with self._changed:
-            batch, loss = self._backlog.take(self._batch), self._backlog.loss
+            batch, loss = self._backlog.take(self._batch), self._backlog.take_loss()
             reason = self._problem or "entries came faster than they could be written"
             self._busy_s, used = time.monotonic(), self._used
         if not batch and loss is None and self._problem is None:
@@ -279,29 +279,30 @@ class History:
         try:
             self._writer.write(batch, loss, reason, used)
         except Exception as error:
-            self._put_back(batch, error)
+            self._put_back(batch, loss, error)
             if is_passing(error):
                 raise
             return True
         with self._changed:
-            self._backlog.written(batch, loss)
+            self._backlog.written(batch)
             self._written += len(batch)
             self._batch = BATCH
             self._changed.notify_all()
         self._recover()
         return bool(batch)
 
-    def _put_back(self, batch: Sequence[Entry], error: Exception) -> None:
+    def _put_back(self, batch: Sequence[Entry], loss: Loss | None, error: Exception) -> None:
         """What cannot be stored for what it is must not hold up all others: it is found by halves, and goes."""
         with self._changed:
             if is_passing(error):
-                self._backlog.put_back(batch)
+                self._backlog.put_back(batch, loss)
             elif len(batch) == 1:
+                self._backlog.put_back((), loss)
                 self._backlog.lose(batch)
                 log.error("an entry of the history cannot be stored", extra=about(said=first_line(error)))
             else:
                 self._batch = max(1, len(batch) // 2)
-                self._backlog.put_back(batch)
+                self._backlog.put_back(batch, loss)
 
     def _recover(self) -> None:
         with self._changed:
