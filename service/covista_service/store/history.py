@@ -271,7 +271,9 @@ class History:
     def _write(self) -> bool:
         """Write the next batch; False if there is none, nor a gap to be marked."""
         with self._changed:
-            batch, loss = self._backlog.take(self._batch), self._backlog.take_loss()
+            loss = self._backlog.take_loss()
+            # While it is looked for what cannot be stored, gaps go by themselves: one of the two is at fault.
+            batch = self._backlog.take(0 if loss is not None and self._batch < BATCH else self._batch)
             reason = self._problem or "entries came faster than they could be written"
             self._busy_s, used = time.monotonic(), self._used
         if not batch and loss is None and self._problem is None:
@@ -279,30 +281,36 @@ class History:
         try:
             self._writer.write(batch, loss, reason, used)
         except Exception as error:
-            self._put_back(batch, loss, error)
-            if is_passing(error):
+            if not self._put_back(batch, loss, error):
                 raise
             return True
         with self._changed:
             self._backlog.written(batch)
             self._written += len(batch)
-            self._batch = BATCH
+            if batch:
+                self._batch = BATCH
             self._changed.notify_all()
         self._recover()
-        return bool(batch)
+        return bool(batch) or loss is not None
 
-    def _put_back(self, batch: Sequence[Entry], loss: Loss | None, error: Exception) -> None:
-        """What cannot be stored for what it is must not hold up all others: it is found by halves, and goes."""
+    def _put_back(self, batch: Sequence[Entry], loss: Loss | None, error: Exception) -> bool:
+        """What cannot be stored for what it is must not hold up all others: it is found by halves, and goes.
+
+        False if it is the database that has to be waited for.
+        """
         with self._changed:
-            if is_passing(error):
+            if is_passing(error) or not (batch or loss):
                 self._backlog.put_back(batch, loss)
-            elif len(batch) == 1:
-                self._backlog.put_back((), loss)
+                return False
+            if not batch:
+                log.error("a gap of the history cannot be stored", extra=about(said=first_line(error), gap=str(loss)))
+            elif len(batch) == 1 and loss is None:
                 self._backlog.lose(batch)
                 log.error("an entry of the history cannot be stored", extra=about(said=first_line(error)))
             else:
                 self._batch = max(1, len(batch) // 2)
                 self._backlog.put_back(batch, loss)
+        return True
 
     def _recover(self) -> None:
         with self._changed:

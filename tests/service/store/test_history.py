@@ -11,6 +11,7 @@ from covista_schemas.reports import EventKind, EventReport, LiveSettings, time_o
 from covista_service.answers import groups_report
 from covista_service.loop import News, SinkStatus
 from covista_service.store.archive import Archive
+from covista_service.store.backlog import Loss
 from covista_service.store.database import DatabaseError, check_url, open_engine
 from covista_service.store.history import History
 from covista_service.store.retention import Retention
@@ -196,6 +197,7 @@ def test_a_path_that_cannot_be_opened_degrades_and_heals(tmp_path: Path, caplog:
     told = [(record.levelname, record.msg) for record in caplog.records]
     assert told == [
         ("WARNING", "the history waits for its database"),
+        ("WARNING", "the station starts without its database"),
         ("INFO", "the history is written again"),
     ]
 
@@ -266,6 +268,31 @@ def test_an_entry_that_cannot_be_stored_does_not_take_the_others_with_it(url: st
     assert ask(url, "select number from events order by id") == [(number,) for number in range(1, 40)]
     assert history.dropped == 1
     assert ask(url, "select lost from gaps") == [(1,)]
+
+
+def test_a_gap_that_cannot_be_stored_goes_and_holds_up_nobody(url: str, caplog: pytest.LogCaptureFixture) -> None:
+    news = news_of(two_robots())
+    with kept(url, first_pause_s=60.0) as history:
+        with history._changed:
+            # Counts that no database holds.
+            history._backlog.put_back((), Loss(0, 0, 2**63))
+            for each in numbered(news, 1, 2, 3):
+                history.take(each)
+        assert history.flush(10)
+        assert history.health().status == "ready"
+    assert ask(url, "select number from events order by id") == [(1,), (2,), (3,)]
+    assert ask(url, "select count(*) from gaps") == [(0,)]
+    assert caplog.text.count("a gap of the history cannot be stored") == 1
+    assert history.dropped == 0
+
+
+def test_a_gap_alone_that_cannot_be_stored_goes(url: str, caplog: pytest.LogCaptureFixture) -> None:
+    history = History(url, retention=FOR_EVER, start_s=0.0)
+    with history._changed:
+        history._backlog.put_back((), Loss(0, 0, 2**63))
+    history.close()
+    assert not history._thread.is_alive()
+    assert "a gap of the history cannot be stored" in caplog.text
 
 
 @pytest.mark.parametrize(
