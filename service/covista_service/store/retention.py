@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, Table, and_, delete, select
+from sqlalchemy import ColumnElement, Connection, Row, Table, and_, delete, select
 
 from covista_service.store.tables import events, gaps, group_revisions, pair_overlaps, settings_changes, tracks
 
@@ -13,6 +15,10 @@ from covista_service.store.tables import events, gaps, group_revisions, pair_ove
 STEP = 1000
 # What is removed for its size is as old everywhere, within this.
 _EVEN_US = 600_000_000
+# Settings that were given are kept for what they name, but no more than so many that name nothing of their own.
+MOST_CHANGES = 2000
+# No more are read at a time: what is behind them comes into sight as those before it go.
+READ_CHANGES = 10_000
 PAST = (tracks, pair_overlaps, events, group_revisions, gaps)
 
 
@@ -55,19 +61,29 @@ def drop_oldest(connection: Connection) -> bool:
     return False
 
 
-def drop_superseded(connection: Connection, cutoff_us: int) -> None:
-    """Remove settings that were given before, as far as newer ones name all that they name."""
-    changes = settings_changes.c
-    rows = connection.execute(select(changes.id, changes.time_us, changes.patch).order_by(changes.id.desc())).all()
+def drop_superseded(connection: Connection, cutoff_us: int) -> bool:
+    """Remove some of the settings that were given before, as far as newer ones name all that they name.
+
+    Those that are older, and those behind the newest `MOST_CHANGES`. True if there may be more.
+    """
     newer: set[str] = set()
     superseded: list[int] = []
-    for key, time_us, text in rows:
+    rows = newest_changes(connection)
+    for place, (key, time_us, text) in enumerate(rows):
         names = set(patch_of(text))
-        if time_us < cutoff_us and names <= newer:
+        if (time_us < cutoff_us or place >= MOST_CHANGES) and names <= newer:
             superseded.append(key)
         newer |= names
     if superseded:
-        connection.execute(delete(settings_changes).where(changes.id.in_(superseded[-STEP:])))
+        connection.execute(delete(settings_changes).where(settings_changes.c.id.in_(superseded[-STEP:])))
+    return len(superseded) > STEP or (bool(superseded) and len(rows) == READ_CHANGES)
+
+
+def newest_changes(connection: Connection) -> Sequence[Row[Any]]:
+    """Key, time and patch of the settings given last, the newest first; no more than `READ_CHANGES`."""
+    changes = settings_changes.c
+    newest = select(changes.id, changes.time_us, changes.patch).order_by(changes.id.desc()).limit(READ_CHANGES)
+    return connection.execute(newest).all()
 
 
 def patch_of(text: str) -> dict[str, object]:

@@ -20,7 +20,7 @@ from covista_service.store.moments import within
 from covista_service.store.numbers import LastNumbers, ahead, last_used, reserve
 from covista_service.store.present import Present
 from covista_service.store.recollection import recollect
-from covista_service.store.retention import Retention, drop_older, drop_superseded, patch_of
+from covista_service.store.retention import Retention, drop_older, drop_superseded, newest_changes, patch_of
 from covista_service.store.rows import Entry, SettingsChange, time_us_of, write
 from covista_service.store.size import size_of
 from covista_service.store.tables import events, gaps, group_revisions, settings_changes
@@ -182,9 +182,8 @@ class Writer:
     def _drop_older(self, cutoff_us: int) -> bool:
         with self._engine.begin() as connection:
             more = drop_older(connection, cutoff_us)
-            if not more:
-                drop_superseded(connection, cutoff_us)
-        return more
+            # Of settings in its turn: a step ends within milliseconds.
+            return more or drop_superseded(connection, cutoff_us)
 
     def _repeat(self, step: Callable[[], bool]) -> bool:
         """Take steps until there is nothing to do, or it takes too long; True if there is more."""
@@ -196,8 +195,8 @@ class Writer:
 
 
 def _patch(connection: Connection) -> dict[str, object]:
-    patches = connection.execute(select(settings_changes.c.patch).order_by(settings_changes.c.id)).scalars()
-    return {name: value for text in patches for name, value in patch_of(text).items()}
+    oldest_first = reversed(newest_changes(connection))
+    return {name: value for row in oldest_first for name, value in patch_of(row.patch).items()}
 
 
 def _begun_us(connection: Connection) -> int | None:

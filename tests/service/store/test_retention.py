@@ -1,11 +1,13 @@
 """What is too old goes, and what is too much, the oldest first, while the history is written."""
 
+import json
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from covista_schemas.reports import FoundBy
+from covista_service.store import retention
 from covista_service.store.backlog import Loss
 from covista_service.store.database import open_engine
 from covista_service.store.migrations import upgrade
@@ -95,6 +97,30 @@ def test_settings_that_stand_are_kept_however_old(engine: Engine) -> None:
     assert kept == ['{"alpha": 0.2, "sigma": "std"}', '{"alpha": 0.3}', '{"groups": 2}']
 
 
+def test_settings_given_without_end_stay_few_and_what_stands_is_kept(
+    engine: Engine, url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(retention, "READ_CHANGES", 100)
+    monkeypatch.setattr(retention, "MOST_CHANGES", 20)
+    monkeypatch.setattr(retention, "STEP", 30)
+    given = [{"sigma": "std"}] + [{"alpha": number / 1000} for number in range(500)]
+    put(engine, *(SettingsChange(at(second), None, patch, LiveSettings()) for second, patch in enumerate(given)))
+    writer = Writer(url, Retention(days=36_500))
+    writer.start()
+    # Only so many are read.
+    assert writer.patch == {"alpha": 0.499}
+    while writer.tidy():
+        pass
+    writer.dispose()
+    # The newest, and the one that alone names what it names; none was too old.
+    kept = ask(url, "select patch from settings_changes order by id")
+    assert [json.loads(patch) for (patch,) in kept] == [given[0], *given[-20:]]
+    writer = Writer(url, Retention(days=36_500))
+    writer.start()
+    assert writer.patch == {"sigma": "std", "alpha": 0.499}
+    writer.dispose()
+
+
 def test_age_is_held_while_the_history_is_written(url: str) -> None:
     now_s = time.time()
     engine = open_engine(url)
@@ -107,8 +133,8 @@ def test_age_is_held_while_the_history_is_written(url: str) -> None:
 
 
 def test_a_file_does_not_grow_beyond_its_limit(tmp_path: Path) -> None:
-    file, retention = tmp_path / "covista.db", Retention(days=36_500, mb=8)
-    writer = Writer(f"sqlite:///{file}", retention)
+    file, limits = tmp_path / "covista.db", Retention(days=36_500, mb=8)
+    writer = Writer(f"sqlite:///{file}", limits)
     writer.start()
     largest = second = 0
     for _ in range(120):
@@ -129,7 +155,7 @@ def test_a_file_does_not_grow_beyond_its_limit(tmp_path: Path) -> None:
         assert connection.exec_driver_sql("pragma integrity_check").scalar() == "ok"
     engine.dispose()
     writer.dispose()
-    assert largest <= retention.limit_bytes
+    assert largest <= limits.limit_bytes
     # It is used, and what is kept is the newest.
     assert rows > 20_000
     assert newest == us(second - 1 + 19 / 20)
@@ -137,8 +163,8 @@ def test_a_file_does_not_grow_beyond_its_limit(tmp_path: Path) -> None:
 
 def test_a_server_does_not_grow_far_beyond_its_limit(server: object) -> None:
     url = server.new_database()
-    retention = Retention(days=36_500, mb=8)
-    writer = Writer(url, retention)
+    limits = Retention(days=36_500, mb=8)
+    writer = Writer(url, limits)
     writer.start()
     size, second, sizes = size_of(open_engine(url)), 0, []
     for _ in range(150):
@@ -154,8 +180,8 @@ def test_a_server_does_not_grow_far_beyond_its_limit(server: object) -> None:
         sizes.append(size._taken())
     writer.dispose()
     size._engine.dispose()
-    assert max(sizes) <= 1.3 * retention.limit_bytes
-    assert min(sizes[75:]) >= 0.5 * retention.limit_bytes
+    assert max(sizes) <= 1.3 * limits.limit_bytes
+    assert min(sizes[75:]) >= 0.5 * limits.limit_bytes
 
 
 def test_a_server_that_cannot_vacuum_loses_no_more_than_one_look_takes(
