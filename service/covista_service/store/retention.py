@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, Row, Table, and_, delete, select
+from sqlalchemy import ColumnElement, Connection, Table, and_, delete, select
 
 from covista_service.store.tables import events, gaps, group_revisions, pair_overlaps, settings_changes, tracks
 
@@ -79,11 +77,11 @@ def drop_superseded(connection: Connection, cutoff_us: int) -> bool:
     return len(superseded) > STEP or (bool(superseded) and len(rows) == READ_CHANGES)
 
 
-def newest_changes(connection: Connection) -> Sequence[Row[Any]]:
+def newest_changes(connection: Connection) -> list[tuple[int, int, str]]:
     """Key, time and patch of the settings given last, the newest first; no more than `READ_CHANGES`."""
     changes = settings_changes.c
     newest = select(changes.id, changes.time_us, changes.patch).order_by(changes.id.desc()).limit(READ_CHANGES)
-    return connection.execute(newest).all()
+    return [(key, time_us, patch) for key, time_us, patch in connection.execute(newest)]
 
 
 def patch_of(text: str) -> dict[str, object]:
