@@ -196,7 +196,7 @@ class Writer:
 
 def _patch(connection: Connection) -> dict[str, object]:
     oldest_first = reversed(newest_changes(connection))
-    return {name: value for row in oldest_first for name, value in patch_of(row.patch).items()}
+    return {name: value for _, _, patch in oldest_first for name, value in patch_of(patch).items()}
 
 
 def _begun_us(connection: Connection) -> int | None:
