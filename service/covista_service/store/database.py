@@ -73,6 +73,16 @@ def file_is_gone(engine: Engine) -> bool:
     return file is not None and not file.exists()
 
 
+def stamp_of(engine: Engine) -> tuple[int, int] | None:
+    """Which file of SQLite the engine's database is, None where it is not there or no file: another has another one."""
+    file = file_of(engine.url)
+    try:
+        found = None if file is None else file.stat()
+    except OSError:
+        return None
+    return None if found is None else (found.st_dev, found.st_ino)
+
+
 def prepare_file(engine: Engine) -> None:
     """Let a file of SQLite that an earlier version has made give back room too; a large one is left as it is."""
     file = file_of(engine.url)

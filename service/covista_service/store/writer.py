@@ -14,7 +14,7 @@ from sqlalchemy import Connection, Engine, func, insert, select
 from covista_service.station.memory import Memory
 from covista_service.station.snapshot import Snapshot
 from covista_service.store.backlog import Loss
-from covista_service.store.database import file_is_gone, open_engine, prepare_file
+from covista_service.store.database import file_is_gone, open_engine, prepare_file, stamp_of
 from covista_service.store.migrations import upgrade
 from covista_service.store.moments import within
 from covista_service.store.numbers import LastNumbers, ahead, last_used, reserve
@@ -48,6 +48,7 @@ class Writer:
         self._open = self.continues = self._is_late = False
         self._begun_us: int | None = None
         self._removed: Loss | None = None
+        self._stamp: tuple[int, int] | None = None
         self._reserved = self._used = LastNumbers()
         self._patch: dict[str, object] = {}
         self._settings: LiveSettings | None = None
@@ -142,7 +143,8 @@ class Writer:
         self._engine.dispose()
 
     def _reopen(self) -> None:
-        if file_is_gone(self._engine):
+        # Whoever looks at a database whose file is gone makes an empty one: so it is gone too if it is another.
+        if file_is_gone(self._engine) or (self._stamp is not None and stamp_of(self._engine) != self._stamp):
             if self._begun_us is not None and self._removed is None:
                 self._removed = Loss(self._begun_us, self._clock() // 1000, 0)
                 log.warning(
@@ -163,8 +165,12 @@ class Writer:
             yield last
             reserved = ahead(last.over(self._reserved), self._used)
             reserve(connection, reserved)
-            self._restore(connection)
             begun_us = _begun_us(connection)
+            if begun_us is not None:
+                # A file that was put in the place of the other has a past of its own.
+                self._removed = None
+            self._restore(connection)
+        self._stamp = stamp_of(self._engine)
         self._reserved, self._removed, self._begun_us, self._open = reserved, None, begun_us, True
         self._present.forget()
 
