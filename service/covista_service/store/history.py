@@ -29,7 +29,7 @@ FIRST_PAUSE_S = 0.1
 LONGEST_PAUSE_S = 5.0
 PERIOD_S = 1.0
 # A database that starts together with the station is waited for so long: it has the numbers and settings to go on with.
-START_S = 15.0
+START_S = 5.0
 _LONGEST_START_PAUSE_S = 1.0
 # Whoever closes waits so long.
 CLOSE_S = 2.0
