@@ -100,7 +100,7 @@ def test_forgetting_says_so(run: Run, api: _Station) -> None:
 
 
 def test_a_token_that_does_not_reach_so_far_is_told_what_it_lacks(run: Run) -> None:
-    with telling(lambda teller: teller.refuse(403)) as server:
+    with telling(lambda teller: teller.refuse(403, {"WWW-Authenticate": "Bearer"})) as server:
         code, out, err = run("groups", "--url", server.url, "--token", "secret")
     assert (code, out) == (1, "")
     assert err == "covista: GET /api/v1/groups needs a token with scope read\n"
