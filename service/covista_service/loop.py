@@ -41,13 +41,11 @@ from covista_service.station.events import (
     SurveyDone,
     SurveyPair,
     Tick,
-    TokenLost,
-    TokenSeen,
 )
 from covista_service.station.snapshot import Snapshot
 from covista_service.station.station import Station
 from covista_service.telemetry import WORKER_FAILED, JobKind, Stage, Telemetry, about
-from covista_service.telemetry.journal import note_effect, note_event
+from covista_service.telemetry.journal import note_effect, note_event, robot_of
 
 TICK_S = 0.25
 # While news of keyframes waits to be evaluated.
@@ -290,7 +288,7 @@ class Loop:
             # A bug that one robot's message brings to light must not silence the swarm.
             self._telemetry.fault("station")
             log.exception(
-                "the station failed; going on", extra=about(event=type(event).__name__, robot=_robot_of(event))
+                "the station failed; going on", extra=about(event=type(event).__name__, robot=robot_of(event))
             )
             effects = failure.effects if isinstance(failure, InterruptedTickError) else []
         for effect in effects:
@@ -393,13 +391,3 @@ def _surveyed(job: SurveyPair, done: Future[Comparison]) -> SurveyDone:
 def _describe(what: str, failure: BaseException, **whom: object) -> str:
     log.error("a job failed", exc_info=failure, extra=about(job=what, **whom))
     return f"{what} failed: {type(failure).__name__}: {failure}"
-
-
-def _robot_of(event: Event) -> str | None:
-    """The robot whose message it is, if it is one's."""
-    match event:
-        case KeyframeArrived(keyframe):
-            return keyframe.id.robot
-        case MessagesReceived() | MessageDropped() | PoseArrived() | TokenSeen() | TokenLost():
-            return event.robot
-    return None

@@ -11,8 +11,13 @@ from covista_service.station.events import (
     Event,
     FeaturesExtracted,
     Happened,
+    KeyframeArrived,
     MessageDropped,
+    MessagesReceived,
+    PoseArrived,
     SurveyDone,
+    TokenLost,
+    TokenSeen,
 )
 from covista_service.telemetry.logs import about
 
@@ -51,6 +56,16 @@ def note_effect(effect: Effect) -> None:
             log.info(str(effect.kind), extra=about(**_whom(effect), said=effect.text))
         case Happened():
             log.debug(str(effect.kind), extra=about(**_whom(effect), said=effect.text))
+
+
+def robot_of(event: Event) -> str | None:
+    """The robot whose message it is, if it is one's."""
+    match event:
+        case KeyframeArrived(keyframe):
+            return keyframe.id.robot
+        case MessagesReceived() | MessageDropped() | PoseArrived() | TokenSeen() | TokenLost():
+            return event.robot
+    return None
 
 
 def _whom(effect: Happened) -> dict[str, object]:

@@ -35,9 +35,10 @@ from covista_service.station.memory import Memory
 from covista_service.station.options import StationOptions
 from covista_service.station.outlook import Prospect, Ratios
 from covista_service.station.pairs import Answer
-from covista_service.station.remembering import remember
 from covista_service.station.snapshot import Snapshot
 from covista_service.station.station import Station
+
+from tests.service.station.remembering import remember
 
 S = 1_000_000_000
 START_NS = 1_700_000_000 * S

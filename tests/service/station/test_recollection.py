@@ -9,11 +9,11 @@ from covista_service.perception.camera import Camera, Pose
 from covista_service.station.events import KeyframeId
 from covista_service.station.memory import Memory, RememberedKeyframe, RememberedPair, RememberedRobot
 from covista_service.station.recollection import sensible
-from covista_service.station.remembering import remember
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.service.station.memories import plain
+from tests.service.station.remembering import remember
 from tests.service.station.scenes import CAMERA, START_NS, S, Scene, measured, pose
 
 IDS = st.sampled_from(["r1", "r2", "r3", "r4", "R 5", ""])

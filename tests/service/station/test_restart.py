@@ -6,11 +6,11 @@ from covista_service.perception.camera import Pose
 from covista_service.station.events import BuildSurfaces, Effect, GroupsChanged, PoseArrived, SurveyPair, TokenSeen
 from covista_service.station.ledger import Counts
 from covista_service.station.memory import Memory
-from covista_service.station.remembering import remember
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.service.station.memories import plain
+from tests.service.station.remembering import remember
 from tests.service.station.scenes import BACK, NOTHING, S, Scene, happenings, measured, pose, surveys
 from tests.service.station.test_groups import changes, groups, share, two_groups
 from tests.service.station.test_laws import Life, assert_agreement

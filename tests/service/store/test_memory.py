@@ -14,7 +14,6 @@ import pytest
 from covista_service.loop import News
 from covista_service.station.events import ForgetRobot
 from covista_service.station.memory import Memory
-from covista_service.station.remembering import remember
 from covista_service.store import present
 from covista_service.store.archive import Archive
 from covista_service.store.history import History
@@ -25,6 +24,7 @@ from hypothesis import strategies as st
 from tests.service.deadline import wait_until
 from tests.service.link.test_publish import news_of, two_robots
 from tests.service.station.memories import plain
+from tests.service.station.remembering import remember
 from tests.service.station.scenes import NOTHING, S, Scene, measured, pose
 from tests.service.store.test_history import ask, kept
 
