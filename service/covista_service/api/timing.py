@@ -22,6 +22,7 @@ def timed(app: ASGIApp) -> ASGIApp:
         state: State = scope["state"]
         telemetry = state["parts"].telemetry
         begun_s = telemetry.timer()
+        telemetry.asked()
         answered = False
 
         def note(status: int) -> None:

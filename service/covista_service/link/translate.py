@@ -38,7 +38,8 @@ def events_of(mail: Mail) -> Iterator[Event]:
         yield TokenSeen(mail.robot, boot) if alive else TokenLost(mail.robot, boot)
     for topic, box in mail.garbage.items():
         yield from _accounts(mail.robot, topic, box)
-    for topic, box in mail.boxes.items():
+    # A pose that came before the keyframe would be old news after it.
+    for topic, box in sorted(mail.boxes.items(), key=lambda each: each[1].kept.arrived_ns if each[1].kept else 0):
         yield from _accounts(mail.robot, topic, box)
         if box.kept is not None:
             yield _open(box.kept)

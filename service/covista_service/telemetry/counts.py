@@ -54,6 +54,7 @@ class Telemetry:
         self._outcomes: Counter[str] = Counter()
         self._latencies_s: deque[float] = deque(maxlen=_SAMPLES)
         self._under_way: Counter[str] = Counter()
+        self._asked = 0
         self._surveys = self._count("covista_surveys", "Surveys by what they came to.", "outcome")
         self._faults = self._count("covista_faults", "Errors of the station itself, by where.", "where")
         self._jobs = Gauge(
@@ -130,8 +131,17 @@ class Telemetry:
         finally:
             self._stages[stage].observe(self.timer() - begun_s)
 
+    def is_asked(self) -> bool:
+        """Does anybody wait for REST to answer?"""
+        return self._asked > 0
+
+    def asked(self) -> None:
+        """REST was asked, and will have `answered`."""
+        self._asked += 1
+
     def answered(self, route: str, status: int, seconds: float) -> None:
         """REST has answered; `route` is the template of the path, so that there are few of them."""
+        self._asked -= 1
         self._requests.labels(route).observe(seconds)
         self._answers.labels(route, str(status)).inc()
 

@@ -192,7 +192,7 @@ def test_patches_at_the_same_time_are_laid_one_over_the_other(tmp_path: Path) ->
 
 
 def test_a_station_that_does_not_turn_says_so(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("covista_service.loop.DO_TIMEOUT_S", 0.05)
+    monkeypatch.setattr("covista_service.loop.task.DO_TIMEOUT_S", 0.05)
     monkeypatch.setattr(desk.parts.loop, "turn", lambda: False)
     response = desk.send("PATCH", "/settings", {"alpha": 0.9})
     assert (response.status_code, response.headers["retry-after"]) == (503, "5")
@@ -230,7 +230,7 @@ def test_a_robot_is_forgotten_with_who_wanted_it(desk: Desk, notebook: Notebook,
 def test_what_was_refused_for_want_of_a_turn_is_not_done_later(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
     loop = desk.parts.loop
     with monkeypatch.context() as patch:
-        patch.setattr("covista_service.loop.DO_TIMEOUT_S", 0.05)
+        patch.setattr("covista_service.loop.task.DO_TIMEOUT_S", 0.05)
         patch.setattr(loop, "turn", lambda: False)
         assert desk.send("PATCH", "/settings", {"alpha": 0.9}).status_code == 503
         assert desk.ask("/api/v1/robots/r1", "DELETE").status_code == 503

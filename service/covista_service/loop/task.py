@@ -1,4 +1,4 @@
-"""The one task that owns the station: draws events from a source, sends jobs to workers and news to sinks."""
+"""The task itself."""
 
 from __future__ import annotations
 
@@ -7,19 +7,17 @@ import itertools
 import logging
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import nullcontext, suppress
-from dataclasses import dataclass, field
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 from covista_schemas.errors import DecodeError
-from covista_schemas.reports import EventReport, LiveSettings
 
 from covista_service.answers import event_report, live_settings
-from covista_service.perception.camera import Features
+from covista_service.loop.courtesy import give_way
+from covista_service.loop.parties import Built, Crew, Extraction, News, Sink, Source
 from covista_service.perception.comparison import Comparison
-from covista_service.perception.scene import Evidence, Settled
 from covista_service.station.census import Census
 from covista_service.station.events import (
     BuildSurfaces,
@@ -59,92 +57,7 @@ _NS_PER_S = 1e9
 _STAGES: Mapping[type[Event], Stage] = {Tick: "regroup", SurfacesBuilt: "reading"}
 _UNTIMED = nullcontext()
 _T = TypeVar("_T")
-# Features of an image and its thumbnail as JPEG; settled keyframes and the evidence with depths.
-Extraction = tuple[Features, bytes | None]
-Built = tuple[tuple[Settled, ...], Mapping[tuple[int, int], Evidence]]
-
 log = logging.getLogger(__name__)
-
-
-class Source(Protocol):
-    """Where events come from."""
-
-    def attach(self, wake: Callable[[], None]) -> None:
-        """Say whom to wake, from any thread, when there are events."""
-
-    def drain(self, limit: int, now_ns: int) -> tuple[Iterable[Event], int | None]:
-        """Events of up to `limit` robots, and when there are more, perhaps at once; None: not before it wakes."""
-
-
-@dataclass(frozen=True, slots=True)
-class CrewStatus:
-    """How those are who do the heavy work: `capacity` jobs at a time, by `kind` (threads, processes, dask).
-
-    `fallback` says why they work here and not where they should, None if they do; `remark` is what else a person should
-    know. Since the start, `lost` workers died or went away, `retried` jobs had to be done again, `overdue` ones did not
-    return in time, and `given_up` ones failed for having done so again. `shipped_bytes` of features went to workers;
-    `shipped_again` times those that were lost there.
-    """
-
-    kind: str
-    capacity: int
-    warm: bool = True
-    fallback: str | None = None
-    remark: str | None = None
-    lost: int = 0
-    retried: int = 0
-    overdue: int = 0
-    given_up: int = 0
-    shipped_bytes: int = 0
-    shipped_again: int = 0
-
-
-class Crew(Protocol):
-    """Who does the heavy work."""
-
-    def extract(self, keyframe: Keyframe) -> Future[Extraction]:
-        """Decode the keyframe's image and extract its features, and a thumbnail."""
-
-    def survey(self, job: SurveyPair) -> Future[Comparison]:
-        """Survey a pair."""
-
-    def build(self, job: BuildSurfaces) -> Future[Built]:
-        """Settle poses and surfaces."""
-
-    def status(self) -> CrewStatus:
-        """How they are; asked every turn."""
-
-
-@dataclass(frozen=True, slots=True)
-class News:
-    """What the world should hear of: what happened, and whether a new revision of the groups stands.
-
-    `robots` are those whose own group is not what they were told last. `settings` are those in force since somebody
-    gave others, in a flat `patch` such as {"hysteresis.gain": 0.1}: there may be no event, where they are the same.
-    """
-
-    snapshot: Snapshot
-    events: tuple[EventReport, ...]
-    groups_changed: bool
-    robots: tuple[str, ...]
-    settings: LiveSettings | None = None
-    patch: Mapping[str, object] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, slots=True)
-class SinkStatus:
-    """How a sink is doing: entries that wait, and those that were told or lost since the start."""
-
-    waiting: int
-    told: int
-    lost: int
-
-
-class Sink(Protocol):
-    """Who tells the world; returns at once."""
-
-    def take(self, news: News) -> None:
-        """Tell, later and elsewhere."""
 
 
 class Loop:
@@ -185,6 +98,7 @@ class Loop:
                 async with asyncio.timeout(self._rest_s()):
                     await self._awake.wait()
             self._awake.clear()
+            begun_s = time.perf_counter()
             try:
                 with self._telemetry.timed("turn"):
                     more = self.turn()
@@ -194,7 +108,7 @@ class Loop:
                 # The swarm is better served by a station that lost one batch than by none.
                 self._telemetry.fault("loop")
                 log.exception("a turn failed; going on")
-            await asyncio.sleep(0)
+            await give_way(time.perf_counter() - begun_s, self._telemetry.is_asked)
 
     def turn(self) -> bool:
         """Take in one batch and act on it; True if there is more to take in."""
