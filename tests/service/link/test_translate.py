@@ -127,3 +127,16 @@ def test_refusals_and_tokens_become_events() -> None:
         TokenLost("r1", "old"),
         MessageDropped("r1", "pose", codec.MALFORMED, "payload: garbage", 2, counted=False, count=3),
     ]
+
+
+def test_what_came_first_is_heard_first() -> None:
+    """A pose that came before a keyframe would be outdated by it, and the other way round."""
+    boxes = Mailboxes()
+    boxes.put(Letter("r1", "pose", "b0", 0, pose_bytes("r1", 0.1), 77))
+    boxes.put(Letter("r1", "keyframe", "b0", 0, keyframe_bytes("r1", 0.5), 78))
+    boxes.put(Letter("r2", "keyframe", "b0", 0, keyframe_bytes("r2", 0.5), 77))
+    boxes.put(Letter("r2", "pose", "b0", 0, pose_bytes("r2", 0.6), 78))
+    kinds: dict[str, list[type[Event]]] = {}
+    for mail in boxes.drain(2, 10**9)[0]:
+        kinds[mail.robot] = [type(event) for event in events_of(mail) if not isinstance(event, MessagesReceived)]
+    assert kinds == {"r1": [PoseArrived, KeyframeArrived], "r2": [KeyframeArrived, PoseArrived]}
