@@ -6,6 +6,8 @@ PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 COMPOSE ?= $(shell docker compose version >/dev/null 2>&1 && echo docker compose || echo docker-compose)
 STACK := $(COMPOSE) --project-name covista --file docker/compose.yaml
 
+# All tests wait a lot, so several processes share them; the tests of a file stay together.
+TESTS := $(BIN)/pytest --numprocesses=auto --maxprocesses=4 --dist=loadfile
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
 .PHONY: help demo test check api-test bench up down compose-test
@@ -19,7 +21,7 @@ demo: .venv/.demo ## A station and six simulated rovers, until Ctrl-C
 
 test: .venv/.dev ## All tests that need no container
 	@echo "test: all tests that need no container"
-	@$(BIN)/pytest
+	@$(TESTS)
 
 check: .venv/.dev ## Format, lint, types, contracts and tests: what must be green before a push
 	@echo "check: format, lint, types, contracts, tests"
@@ -27,7 +29,7 @@ check: .venv/.dev ## Format, lint, types, contracts and tests: what must be gree
 	@$(BIN)/ruff check --quiet
 	@$(BIN)/mypy
 	@said=$$($(BIN)/lint-imports) || { echo "$$said"; exit 1; }
-	@$(BIN)/pytest
+	@$(TESTS)
 
 api-test: .venv/.dev ## Thousands of questions to every route, all answers held to the description
 	@echo "api-test: more than 5000 questions to a station, some minutes"

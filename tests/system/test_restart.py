@@ -1,8 +1,9 @@
 """A station that is killed and started again goes on: robots, overlaps, groups and their labels, and all numbers."""
 
 import signal
+import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,8 @@ from covista_service.store.archive import Archive
 from tests.service.deadline import free_endpoint, wait_until
 from tests.service.wall import CAMERA, overlap, seen_from
 from tests.system.test_serve import serving
+
+NOW = ("robots_now", "pairs_now")
 
 
 @contextmanager
@@ -27,6 +30,12 @@ def settled(control: MissionControl) -> GroupsReport | None:
     """The groups once r1 and r2 stand in one."""
     groups = control.groups()
     return groups if any(group.robots == ["r1", "r2"] for group in groups.groups) else None
+
+
+def remembered(database: Path) -> tuple[int, ...]:
+    """How many robots and pairs a station would know if it were started now."""
+    with closing(sqlite3.connect(database)) as connection:
+        return tuple(connection.execute(f"select count(*) from {name}").fetchone()[0] for name in NOW)
 
 
 def test_a_station_that_was_killed_goes_on_where_it_was(tmp_path: Path) -> None:
@@ -44,6 +53,7 @@ def test_a_station_that_was_killed_goes_on_where_it_was(tmp_path: Path) -> None:
         # What the station knew a second ago is in its database.
         wait_until(lambda: archive.pair("r1", "r2").items and len(archive.track("r2").items), "it is written")
         wait_until(lambda: archive.groups().items[-1].revision == groups.revision)
+        wait_until(lambda: remembered(tmp_path / "covista.db") == (2, 1), "robots and pair are remembered")
         process.send_signal(signal.SIGKILL)
         process.wait()
     events = archive.events().items

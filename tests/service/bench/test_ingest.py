@@ -95,4 +95,5 @@ def test_what_a_message_costs_is_told_kind_by_kind() -> None:
     costs_us = ingest.costs_us(1.0, {"poses": 2000, "garbage_short": 2000, "keyframes": 20, "garbage_long": 500}, 1)
     assert set(costs_us) == {"poses", "garbage_short", "keyframes", "garbage_long"}
     assert all(len(rounds) == 1 and rounds[0] >= 0 for rounds in costs_us.values())
-    assert costs_us["keyframes"][0] > 0
+    # Of few messages, what the station does by itself beside them may hide all.
+    assert costs_us["garbage_short"][0] > 0
