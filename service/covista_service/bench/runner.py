@@ -13,6 +13,7 @@ from covista_service.bench import (
     latency,
     memory,
     overload,
+    past,
     planes,
     predict_planes,
     predict_poses,
@@ -39,6 +40,7 @@ BENCHES: Mapping[str, Sequence[Bench]] = {
     "memory": (memory.rows,),
     "overload": (overload.rows,),
     "rest": (rest.rows,),
+    "history": (past.rows,),
     "restart": (restart.rows,),
     "sse": (sse.rows,),
 }
