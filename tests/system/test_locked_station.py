@@ -16,9 +16,12 @@ from covista_schemas.errors import LinkError
 from covista_schemas.messages import Pose
 from covista_schemas.reports import PartHealth
 from covista_service.link.admission import Lock
+from covista_service.link.inbox import Inbox
 from covista_service.link.mailbox import Mailboxes
 from covista_service.link.station import LinkOptions, StationLink
 from covista_service.link.switchboard import opening
+from covista_service.serve import run
+from covista_service.station.events import KeyframeArrived
 
 from tests.service.deadline import free_endpoint, wait_until
 from tests.service.wall import CAMERA, seen_from
@@ -121,6 +124,28 @@ def link_detail(control: MissionControl) -> str | None:
     return control.health().parts["link"].detail
 
 
+def test_a_robot_under_another_one_s_name_is_not_heard_and_told_of(
+    certs: Path, robots: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("covista_service.link.strangers._MUTE_AFTER_S", 0.1)
+    endpoint, mailboxes = tls_endpoint(), Mailboxes()
+    with ExitStack() as stack:
+        link = StationLink(LinkOptions((endpoint,), (), "default", Lock(tls_of(certs, "station"), robots)))
+        stack.callback(link.switchboard.close)
+        stack.callback(link.plug_ingest(mailboxes))
+        second = stack.enter_context(closing(rover("r2", endpoint, certs)))
+        liar = stack.enter_context(closing(Rover("r2", CAMERA, endpoint, tls=tls_of(certs, "r1"))))
+        liar.send_keyframe(seen_from(0.0), Pose((0, 0, 0)))
+        wait_until(lambda: link.refused["mute"] == 1 and liar.keyframes_sent, "it is told of")
+        second.send_keyframe(seen_from(0.0), Pose((0, 0, 0)))
+        heard = wait_until(lambda: keyframes_in(mailboxes), "the other one is heard")
+        assert {each.keyframe.id.boot for each in heard} == {second.boot}
+
+
+def keyframes_in(mailboxes: Mailboxes) -> list[KeyframeArrived]:
+    return [each for each in Inbox(mailboxes).drain(10, time.time_ns())[0] if isinstance(each, KeyframeArrived)]
+
+
 def metric(url: str, reason: str) -> float:
     text = httpx.get(f"{url}/metrics", timeout=10).text
     found = re.search(rf'covista_link_refused_total{{reason="{reason}"}} (\S+)', text)
@@ -133,7 +158,7 @@ def test_a_station_waits_for_its_router_and_finds_it_again(tmp_path: Path, certs
     heard: list[str] = []
 
     def hears(robot: str, count: int) -> bool:
-        heard.extend(mail.robot for mail in mailboxes.drain(10, time.time_ns())[0] if "keyframe" in mail.boxes)
+        heard.extend(each.keyframe.id.robot for each in keyframes_in(mailboxes))
         return heard.count(robot) >= count
 
     with ExitStack() as stack:
@@ -226,25 +251,26 @@ def test_certificates_come_together_or_not_at_all(capsys: pytest.CaptureFixture[
 
 
 @pytest.mark.parametrize(
-    ("name", "changes", "status", "said"),
+    ("changes", "said"),
     [
-        ("serve", {"zenoh_tls_key": "absent.key"}, 1, "the key absent.key cannot be read"),
-        (
-            "router",
-            {"link": "tcp/127.0.0.1:1"},
-            2,
-            "setting link (--listen, COVISTA_LINK): 'tcp/127.0.0.1:1' is a plain",
-        ),
+        ({"zenoh_tls_key": "absent.key"}, "the key absent.key cannot be read"),
+        ({"zenoh_tls_robots": "absent.txt"}, "the list of robots absent.txt cannot be read"),
     ],
 )
-def test_a_station_and_a_router_that_cannot_lock_say_so_in_one_line(
-    certs: Path, robots: Path, tmp_path: Path, name: str, changes: dict[str, str], status: int, said: str
+def test_a_station_that_cannot_lock_its_link_does_not_open_it(
+    certs: Path, robots: Path, tmp_path: Path, changes: dict[str, str], said: str
 ) -> None:
-    settings = files(certs, "station") | {"zenoh_tls_robots": str(robots), "link": tls_endpoint()} | changes
-    done = command(tmp_path, name, **{f"COVISTA_{key.upper()}": value for key, value in settings.items()})
-    assert done.returncode == status
+    locked = files(certs, "station") | {"zenoh_tls_robots": str(robots)} | changes
+    with pytest.raises(LinkError, match=said):
+        run(settings_for(tmp_path, link=(tls_endpoint(),), **locked))
+
+
+def test_a_router_that_cannot_lock_says_so_in_one_line(certs: Path, tmp_path: Path) -> None:
+    settings = {f"COVISTA_{name.upper()}": value for name, value in files(certs, "router").items()}
+    done = command(tmp_path, "router", "--listen", "tcp/127.0.0.1:1", **settings)
+    assert done.returncode == 2
     (line,) = done.stderr.splitlines()
-    assert said in line
+    assert line.startswith("setting link (--listen, COVISTA_LINK): 'tcp/127.0.0.1:1' is a plain end point")
 
 
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
