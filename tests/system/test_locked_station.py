@@ -14,7 +14,6 @@ from covista_clients import MissionControl, Rover
 from covista_clients.__main__ import main
 from covista_schemas.errors import LinkError
 from covista_schemas.messages import Pose
-from covista_schemas.reports import PartHealth
 from covista_service.link.admission import Lock
 from covista_service.link.inbox import Inbox
 from covista_service.link.mailbox import Mailboxes
@@ -165,7 +164,8 @@ def test_a_station_waits_for_its_router_and_finds_it_again(tmp_path: Path, certs
         link = StationLink(LinkOptions((), (endpoint,), "default", Lock(tls_of(certs, "station"))))
         stack.callback(link.switchboard.close)
         stack.callback(link.plug_ingest(mailboxes))
-        assert link.health() == PartHealth(status="degraded", detail=f"{endpoint}; no router answers")
+        assert link.health().status == "degraded"
+        assert "no router answers" in str(link.health().detail)
         with process(tmp_path, log, *routing, **files(certs, "router")) as router:
             assert line_of(router) == f"zenoh router on {endpoint}"
             wait_until(lambda: link.health().status == "ready", "they are joined")

@@ -337,7 +337,7 @@ def test_a_robot_that_is_listed_is_let_in_and_one_that_is_not_any_more_is_shut_o
         switchboard.close()
     said = [record.message for record in caplog.records]
     assert said.count("zenoh opens again for others to be let in") == 2
-    assert said.count("zenoh is open again; robots connect within seconds") == 2
+    assert said.count("zenoh is open; robots connect within seconds") == 2
     assert "covista-link" not in [thread.name for thread in threading.enumerate()]
 
 
@@ -357,7 +357,7 @@ def test_what_cannot_open_again_is_tried_until_it_can(certs: Path, tmp_path: Pat
     try:
         fails.set()
         robots.write_text("r1\n")
-        wait_until(lambda: switchboard.problem == "cannot open again: the port is taken", "it says so")
+        wait_until(lambda: switchboard.problem == "cannot open: the port is taken", "it says so")
         assert (switchboard.sessions, switchboard.joined) == (0, False)
         fails.clear()
         wait_until(lambda: switchboard.problem is None, "it opens again")
