@@ -3,6 +3,7 @@
 import re
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -271,6 +272,19 @@ def test_a_router_that_cannot_lock_says_so_in_one_line(certs: Path, tmp_path: Pa
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
     assert line.startswith("setting link (--listen, COVISTA_LINK): 'tcp/127.0.0.1:1' is a plain end point")
+
+
+def test_a_router_loads_nothing_that_computes() -> None:
+    script = """
+import sys
+import covista_service.__main__
+from covista_service.access import warn_of_open_doors
+from covista_service.link.switchboard import Switchboard
+from covista_service.link.zenoh_log import follow_zenoh_log
+print(*({"cv2", "dask", "fastapi", "numba", "scipy"} & set(sys.modules)))
+"""
+    done = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
+    assert done.stdout.strip() == ""
 
 
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
