@@ -5,6 +5,10 @@ import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
+from covista_schemas.zenoh_tls import Tls
+
+CERTS = Path(__file__).parents[2] / "docker" / "certs.sh"
+
 
 @dataclass(frozen=True)
 class Pair:
@@ -36,3 +40,25 @@ def put(source: Pair, target: Pair) -> None:
         beside = place.with_suffix(".new")
         beside.write_bytes(new.read_bytes())
         os.replace(beside, place)
+
+
+def make_certificates(folder: Path, *robots: str) -> Path:
+    """An authority, and certificates for station, router and robots, by the script that operators have."""
+    subprocess.run([CERTS, folder, *robots], check=True, capture_output=True)
+    return folder
+
+
+def make_expired(folder: Path, name: str) -> Tls:
+    """A certificate for the key of one of them that was good until yesterday."""
+    tls, request, cert = tls_of(folder, name), folder / "expired.csr", folder / "expired.pem"
+    ask = ["openssl", "req", "-new", "-key", tls.key, "-subj", f"/CN={name}", "-out", request]
+    sign = ["openssl", "x509", "-req", "-in", request, "-CA", tls.ca, "-CAkey", folder / "ca.key"]
+    sign += ["-set_serial", "7", "-days", "-1", "-out", cert]
+    for command in (ask, sign):
+        subprocess.run(command, check=True, capture_output=True)
+    return Tls(tls.ca, cert, tls.key)
+
+
+def tls_of(folder: Path, name: str) -> Tls:
+    """The files of one of them."""
+    return Tls(folder / "ca.pem", folder / f"{name}.pem", folder / f"{name}.key")

@@ -1,13 +1,20 @@
-"""The station's zenoh session: a router of its own, which rovers connect to and which may join other routers."""
+"""The station's zenoh session: a router of its own, which rovers connect to and which may join other routers.
+
+Where it is not to listen it is a client of a router. (As a router beside that one it now and then lost what robots sent
+right after the two had found each other.)
+"""
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import zenoh
 from covista_schemas.errors import LinkError
 from covista_schemas.zenoh_config import config
+from covista_schemas.zenoh_tls import Tls
 
 # Bursts may wait so long for a link that is busy. One on which a message was dropped is not waited for again until it
 # moves.
@@ -18,14 +25,27 @@ _DROP = "transport/link/tx/queue/congestion_control/drop"
 _PLACE = re.compile(r" at /\S+|[\[\]]")
 
 
-def open_session(listen: Sequence[str], connect: Sequence[str]) -> zenoh.Session:
-    """Listen and join. Raises LinkError, whose text names the end points and the flag to change them."""
-    made = config("router", listen=listen, connect=connect)
+def open_session(
+    listen: Sequence[str],
+    connect: Sequence[str],
+    tls: Tls | None = None,
+    access: Mapping[str, Any] | None = None,
+) -> zenoh.Session:
+    """Listen and join; `access` is who may do what (see `rules`), None for everybody everything.
+
+    Who listens looks for routers that are not there yet until they are; who does not needs one now. Raises LinkError,
+    whose text names the end points and the flag to change them.
+    """
+    made = config("router" if listen else "client", listen=listen, connect=connect, tls=tls)
+    if access is not None:
+        made.insert_json5("access_control", json.dumps(access))
     made.insert_json5(f"{_DROP}/wait_before_drop", str(WAIT_US))
     made.insert_json5(f"{_DROP}/max_wait_before_drop_fragments", str(2 * WAIT_US))
     try:
         return zenoh.open(made)
     except zenoh.ZError as error:
+        if not listen:
+            raise LinkError("no router answers") from error
         reason = _PLACE.sub("", str(error))
         raise LinkError(
             f"cannot listen on {', '.join(listen)}: {reason}; choose another end point with --link (COVISTA_LINK)"
