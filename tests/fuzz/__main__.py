@@ -1,7 +1,7 @@
 """Looks for bytes that break a law, led by what they reach: `python -m tests.fuzz codec -runs=1000000`.
 
-What follows the target's name is for libFuzzer: its options, and folders (the first takes what is found on the way).
-Without a folder the corpus alone is where it starts.
+What follows the target's name is for libFuzzer: its options, and folders (the first takes what is found on the way), or
+files that are to be run once. But for those it starts from the corpus.
 """
 
 import logging
@@ -52,9 +52,10 @@ def main(target: str, *options: str) -> None:
     def ingest(data: bytes) -> None:
         count.add(ingest_law.check_script(data))
 
-    corpus = str(Path(__file__).parent / "corpus" / target)
+    alone = any(Path(option).is_file() for option in options)
+    corpus = [] if alone else [str(Path(__file__).parent / "corpus" / target)]
     atheris.Setup(
-        [target, f"-max_len={MOST_BYTES}", *options, corpus],
+        [target, f"-max_len={MOST_BYTES}", *options, *corpus],
         {"codec": codec, "ingest": ingest}[target],
         custom_mutator={"codec": mutate, "ingest": mutate_script}[target],
     )
