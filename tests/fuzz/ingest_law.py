@@ -155,13 +155,13 @@ class Line:
         """Nothing comes any more: everything that came is on an account, and then nobody is known any more."""
         for key in list(self._tokens):
             self._token(key, appears=False)
-            self._rest()
-        self._rest()
+            self.rest()
+        self.rest()
         assert self.boxes.depths() == Depths(0, 0, 0)
         self._check_accounts()
-        self._check_forgotten()
+        self.check_forgotten()
 
-    def _rest(self) -> None:
+    def rest(self) -> None:
         """Let everybody have had a turn."""
         self.now_ns += S
         self.turn()
@@ -181,7 +181,7 @@ class Line:
         if not self.sent["token"]:
             assert messages == received + sum(away.values()), (accounts, away, self.sent)
 
-    def _check_forgotten(self) -> None:
+    def check_forgotten(self) -> None:
         for _ in range(3):
             self.now_ns += _LONG_S * S
             self._receive(Tick())

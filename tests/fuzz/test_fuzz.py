@@ -114,6 +114,17 @@ def test_whatever_comes_on_whatever_key_has_one_fate_and_nothing_is_kept(
         line.end()
 
 
+@pytest.mark.parametrize("count", [mailbox.MAX_TOKENS, mailbox.MAX_TOKENS + 1, 3 * mailbox.MAX_TOKENS])
+def test_a_robot_whose_tokens_all_vanish_at_once_does_not_live_for_ever(count: int) -> None:
+    line, keys_of = Line(), [f"covista/default/robots/r1/alive/b{number}" for number in range(count)]
+    for key in keys_of:
+        line.take(Record(key, b"", pause_ns=60_000_000, turn=True))
+    for key in keys_of:
+        line.take(Record(key, b"", appears=False))
+    line.rest()
+    line.check_forgotten()
+
+
 def corpus(target: str) -> list[Path]:
     return sorted((seeds.CORPUS / target).iterdir())
 
