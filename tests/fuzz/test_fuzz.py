@@ -73,7 +73,7 @@ def messages(draw: st.DrawFn) -> Record:
 
 
 @given(payloads, robots)
-@settings(max_examples=100)
+@settings(max_examples=60)
 def test_any_bytes_are_a_message_or_one_error_from_the_list(data: bytes, robot: str) -> None:
     check_payload(data)
     check_payload(data, robot)
@@ -102,7 +102,7 @@ def test_a_key_is_read_only_if_it_is_written_so(site: str, robot: str, boot: str
     st.sampled_from([mailbox.MAX_BYTES, 700]),
     st.sampled_from([mailbox.MAX_NAMES, 2]),
 )
-@settings(max_examples=60)
+@settings(max_examples=40)
 def test_whatever_comes_on_whatever_key_has_one_fate_and_nothing_is_kept(
     stream: list[Record], most_bytes: int, most_names: int
 ) -> None:
