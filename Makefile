@@ -10,7 +10,7 @@ STACK := $(COMPOSE) --project-name covista --file docker/compose.yaml
 TESTS := $(BIN)/pytest --numprocesses=auto --maxprocesses=4 --dist=loadfile
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help demo test check api-test bench up down compose-test
+.PHONY: help demo test check api-test fuzz soak bench up down compose-test
 
 help: ## Say what there is to make
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1: \2/p' Makefile
@@ -34,6 +34,19 @@ check: .venv/.dev ## Format, lint, types, contracts and tests: what must be gree
 api-test: .venv/.dev ## Thousands of questions to every route, all answers held to the description
 	@echo "api-test: more than 5000 questions to a station, some minutes"
 	@COVISTA_API_EXAMPLES=250 COVISTA_API_CASES=5000 $(BIN)/pytest -s tests/service/api/test_schemathesis.py
+
+FUZZ_RUNS ?= 1000000
+fuzz: .venv/.fuzz ## A million payloads and many a stream of them, led by what they reach, held to laws
+	@echo "fuzz: $(FUZZ_RUNS) payloads for the codec, then a thirtieth as many streams for ingest, some minutes"
+	@mkdir -p build/fuzz/codec build/fuzz/ingest
+	@$(BIN)/python -m tests.fuzz codec -runs=$(FUZZ_RUNS) -reduce_inputs=0 -artifact_prefix=build/fuzz/ build/fuzz/codec
+	@$(BIN)/python -m tests.fuzz ingest -runs=$$(($(FUZZ_RUNS) / 30)) -reduce_inputs=0 -artifact_prefix=build/fuzz/ build/fuzz/ingest
+
+SOAK_MINUTES ?= 30
+SOAK_OUT ?= build/soak
+soak: .venv/.dev ## Rovers that come, go and fail around one station for half an hour: does anything grow?
+	@echo "soak: $(SOAK_MINUTES) minutes; $(SOAK_OUT) gets soak.png and soak.json"
+	@COVISTA_SOAK_MINUTES=$(SOAK_MINUTES) COVISTA_SOAK_OUT=$(SOAK_OUT) $(BIN)/covista-station bench soak --long
 
 bench: .venv/.dev ## The benchmarks, beside their peers
 	@echo "bench: every benchmark in its short form"
@@ -68,6 +81,11 @@ compose-test: .venv/.dev ## Station and rovers as containers, seen from outside
 	@$(PIP) install --editable '.[dev]'
 	@$(call warm)
 	@touch .venv/.demo $@
+
+.venv/.fuzz: .venv/.dev
+	@echo "Installing the fuzzer into .venv"
+	@$(PIP) install --editable '.[fuzz]'
+	@touch $@
 
 .venv/bin/python:
 	@command -v $(PYTHON) >/dev/null || { echo "Covista needs Python 3.11 or newer, and there is no $(PYTHON): make PYTHON=... names another"; exit 1; }

@@ -29,7 +29,7 @@ _STEADY_S, _LONG_STEADY_S = 60.0, 600.0
 # Before anybody looks: how many of those seconds again.
 _WARM_SHARE = 0.25
 _LOOK_S = 0.5
-_LEFT_OUT = 0.2
+LEFT_OUT = 0.2
 _BLOCKS = 8
 _CONFIDENCE = 0.95
 
@@ -100,7 +100,7 @@ def trend_of(looks: Sequence[tuple[float, float]]) -> Trend:
     A line through the means of blocks: memory that was just taken is not given back at once, so that looks of one
     moment say the same, and a line through them all would seem more certain than it is.
     """
-    kept = np.array(looks[round(_LEFT_OUT * len(looks)) :])
+    kept = np.array(looks[round(LEFT_OUT * len(looks)) :])
     blocks = np.array([block.mean(axis=0) for block in np.array_split(kept, min(_BLOCKS, len(kept)))])
     line = stats.linregress(blocks[:, 0] / 3600, blocks[:, 1])
     quantile = float(stats.t.ppf((1 + _CONFIDENCE) / 2, len(blocks) - 2))

@@ -123,12 +123,14 @@ class Box:
 class Mail:
     """What one robot sent since the last drain; `tokens` says by boot whether its liveliness token is there.
 
-    What has no readable name is `garbage`, and waits by itself: it is in less of a hurry.
+    With `tokens_lost` more of them vanished before than there is place for. What has no readable name is `garbage`,
+    and waits by itself: it is in less of a hurry.
     """
 
     robot: str
     boxes: dict[Topic, Box] = field(default_factory=dict)
     tokens: dict[str, bool] = field(default_factory=dict)
+    tokens_lost: bool = False
     garbage: dict[Topic, Box] = field(default_factory=dict)
 
 
@@ -273,6 +275,8 @@ class Mailboxes:
             # Taken out first, so that the order of the dictionary is that of arrival.
             mail.tokens.pop(boot, None)
             mail.tokens[boot] = alive
+        elif not alive:
+            mail.tokens_lost = True
         return sooner
 
     def _box(self, mail: Mail, topic: Topic, arrived_ns: int) -> tuple[Box, bool]:
@@ -295,6 +299,7 @@ class Mailboxes:
     def _hand_over(self, line: Line, mail: Mail, handed: Mail) -> None:
         if line == "token":
             handed.tokens, mail.tokens = mail.tokens, {}
+            handed.tokens_lost, mail.tokens_lost = mail.tokens_lost, False
         elif line == "garbage":
             handed.garbage, mail.garbage = mail.garbage, {}
         else:

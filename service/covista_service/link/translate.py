@@ -34,6 +34,8 @@ log = logging.getLogger(__name__)
 
 def events_of(mail: Mail) -> Iterator[Event]:
     """What a robot's mail means, in the order in which the station should hear it."""
+    if mail.tokens_lost:
+        yield TokenLost(mail.robot, None)
     for boot, alive in mail.tokens.items():
         yield TokenSeen(mail.robot, boot) if alive else TokenLost(mail.robot, boot)
     for topic, box in mail.garbage.items():

@@ -111,10 +111,10 @@ class TokenSeen:
 
 @dataclass(frozen=True, slots=True)
 class TokenLost:
-    """A robot's liveliness token vanished."""
+    """A robot's liveliness token vanished; without a boot perhaps all of them, of too many to tell."""
 
     robot: str
-    boot: str
+    boot: str | None
 
 
 @dataclass(frozen=True, slots=True)

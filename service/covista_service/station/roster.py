@@ -196,8 +196,11 @@ class Roster:
             known.boot = boot
         known.sign_of_life_ns = now_ns
 
-    def token_lost(self, robot: str, boot: str, now_ns: int) -> None:
+    def token_lost(self, robot: str, boot: str | None, now_ns: int) -> None:
         """A liveliness token vanished: it counts as a sign of life to the last, so that a bounce is not news."""
+        if boot is None:
+            self._tokens_lost(robot, now_ns)
+            return
         known = self._robots.get(robot)
         if known is not None and boot in known.tokens:
             known.tokens.remove(boot)
@@ -206,6 +209,14 @@ class Roster:
             self._tokens[robot].discard(boot)
             if not self._tokens[robot]:
                 del self._tokens[robot]
+
+    def _tokens_lost(self, robot: str, now_ns: int) -> None:
+        """All tokens count as gone: with one too few a robot is present by its messages, with one too many for ever."""
+        self._tokens.pop(robot, None)
+        known = self._robots.get(robot)
+        if known is not None and known.tokens:
+            known.tokens.clear()
+            known.sign_of_life_ns = now_ns
 
     def status(self, robot: Robot, now_ns: int) -> Status:
         """Live, stale or gone at `now_ns`."""
