@@ -13,7 +13,7 @@ import zenoh
 from covista_schemas import codec
 from covista_schemas.keys import RobotTopic
 from covista_service.link.inbox import Inbox
-from covista_service.link.ingest import WRONG_KEY, Ingest, _Opener
+from covista_service.link.ingest import WRONG_KEY, _Opener, _Tokens
 from covista_service.link.mailbox import MAX_BYTES, OVERFLOW, TOO_MANY_ROBOTS, UNKNOWN_ROBOT, Depths, Mailboxes
 from covista_service.perception.camera import Features
 from covista_service.station.events import (
@@ -111,8 +111,7 @@ class Line:
         self.boxes = Mailboxes(max_robots=MAX_ROBOTS, max_bytes=max_bytes)
         self._inbox = Inbox(self.boxes)
         self._openers = {topic: _Opener(topic, self.boxes, self._clock) for topic in ("keyframe", "pose")}
-        # Tokens come through a callback that needs no more of its ingest than this.
-        self._ingest = SimpleNamespace(_closed=False, _mailboxes=self.boxes, _clock=self._clock)
+        self._presence = _Tokens(self.boxes, self._clock)
         self.sent = dict.fromkeys(("keyframe", "pose", "token"), 0)
         self._tokens: dict[str, None] = {}
         self._images = 0
@@ -142,7 +141,7 @@ class Line:
         self.sent["token"] += 1
         self._tokens[key] = None
         kind = zenoh.SampleKind.PUT if appears else zenoh.SampleKind.DELETE
-        Ingest._token(self._ingest, SimpleNamespace(key_expr=key, kind=kind))
+        self._presence.take(SimpleNamespace(key_expr=key, kind=kind))
 
     def turn(self) -> None:
         """The loop comes: the station hears what waits, and all it wants is done."""

@@ -38,37 +38,29 @@ class Ingest:
     def __init__(
         self, session: zenoh.Session, site: str, mailboxes: Mailboxes, clock: Callable[[], int] = time.time_ns
     ) -> None:
-        self._mailboxes = mailboxes
-        self._clock = clock
         self._closed = False
-        # Robots and boots that have a token. Zenoh's threads and ours meet at the end.
-        self._tokens: set[tuple[str, str]] = set()
-        self._at_tokens = threading.Lock()
+        self._tokens = _Tokens(mailboxes, clock)
         self._subscribers: list[zenoh.Subscriber[Any]] = []
         self._threads: list[threading.Thread] = []
         self._listen(session, site, RobotTopic.KEYFRAME, _KEYFRAMES, _Opener("keyframe", mailboxes, clock))
         self._listen(session, site, RobotTopic.POSE, _POSES, _Opener("pose", mailboxes, clock))
         alive = keys.every(site, RobotTopic.ALIVE)
-        self._subscribers.append(session.liveliness().declare_subscriber(alive, self._token, history=True))
+        self._subscribers.append(session.liveliness().declare_subscriber(alive, self._tokens.take, history=True))
 
     @property
     def alive(self) -> frozenset[str]:
         """The robots that have a token."""
-        with self._at_tokens:
-            return frozenset(robot for robot, _ in self._tokens)
+        return self._tokens.robots
 
     def part(self) -> None:
         """Hear no more, and know of no token any more: those that are still there show when we listen anew."""
         self.close()
-        with self._at_tokens:
-            tokens, self._tokens = self._tokens, set()
-        for robot, boot in tokens:
-            self._mailboxes.token(robot, boot, False, self._clock())
+        self._tokens.lose()
 
     def close(self) -> None:
         """Hear no more."""
-        with self._at_tokens:
-            self._closed = True
+        self._closed = True
+        self._tokens.close()
         for subscriber in self._subscribers:
             subscriber.undeclare()
         for thread in self._threads:
@@ -96,10 +88,40 @@ class Ingest:
         except zenoh.ZError:
             log.debug("a channel was closed")
 
-    def _token(self, sample: zenoh.Sample) -> None:
-        with self._at_tokens:
+
+class _Tokens:
+    """The liveliness tokens that are there, by robot and boot. Zenoh's threads and ours meet here."""
+
+    def __init__(self, mailboxes: Mailboxes, clock: Callable[[], int]) -> None:
+        self._mailboxes = mailboxes
+        self._clock = clock
+        self._closed = False
+        self._there: set[tuple[str, str]] = set()
+        self._lock = threading.Lock()
+
+    @property
+    def robots(self) -> frozenset[str]:
+        """The robots that have one."""
+        with self._lock:
+            return frozenset(robot for robot, _ in self._there)
+
+    def take(self, sample: zenoh.Sample) -> None:
+        """Note that a token appeared or vanished."""
+        with self._lock:
             if not self._closed:
                 self._note(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
+
+    def close(self) -> None:
+        """Take no more."""
+        with self._lock:
+            self._closed = True
+
+    def lose(self) -> None:
+        """Have all that are there vanish."""
+        with self._lock:
+            tokens, self._there = self._there, set()
+        for robot, boot in tokens:
+            self._mailboxes.token(robot, boot, False, self._clock())
 
     def _note(self, text: str, is_there: bool) -> None:
         try:
@@ -108,7 +130,7 @@ class Ingest:
             self._mailboxes.turn_away(WRONG_KEY)
             return
         if key.boot is not None:
-            (self._tokens.add if is_there else self._tokens.discard)((key.robot, key.boot))
+            (self._there.add if is_there else self._there.discard)((key.robot, key.boot))
             self._mailboxes.token(key.robot, key.boot, is_there, self._clock())
 
 
