@@ -16,6 +16,7 @@ from covista_schemas.zenoh_tls import Tls
 from numpy.typing import NDArray
 
 from covista_clients.simulation import worlds
+from covista_clients.simulation.accounts import Accountant, account
 from covista_clients.simulation.fleet import Sending, fleet
 from covista_clients.simulation.pacing import Due, Pace, RealTime, schedule
 from covista_clients.simulation.paths import Paths
@@ -23,10 +24,16 @@ from covista_clients.simulation.renderer import render
 from covista_clients.simulation.viewing import pinhole
 from covista_clients.simulation.world import World
 
+# Some thirty years: what is further off is no clock.
+MOST_CLOCK_OFFSET_S = 1e9
+
 
 @dataclass(frozen=True, slots=True)
 class SwarmOptions:
-    """A swarm: how many rovers, where, how often they send, and to whom. Raises ValueError for what makes no sense."""
+    """A swarm: how many rovers, where, how often they send, and to whom. Raises ValueError for what makes no sense.
+
+    `clock_offset_s` is how far the rovers' clocks are ahead.
+    """
 
     robots: int = 6
     world: str = "arena"
@@ -39,6 +46,7 @@ class SwarmOptions:
     width: int = 320
     height: int = 240
     tls: Tls | None = None
+    clock_offset_s: float = 0.0
 
     def __post_init__(self) -> None:
         if self.robots < 1:
@@ -47,6 +55,12 @@ class SwarmOptions:
             raise ValueError(f"there is no world {self.world!r}, but {', '.join(worlds.WORLDS)}")
         if not (0 < self.rate_hz < math.inf and 0 <= self.pose_rate_hz < math.inf):
             raise ValueError("rate_hz must be positive, and pose_rate_hz not negative, and both finite")
+        if not abs(self.clock_offset_s) <= MOST_CLOCK_OFFSET_S:
+            raise ValueError(f"clock_offset_s = {self.clock_offset_s:g} is not within {MOST_CLOCK_OFFSET_S:g} s")
+
+    def now_ns(self) -> int:
+        """The time by the rovers' clocks."""
+        return time.time_ns() + round(self.clock_offset_s * 1e9)
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,20 +149,26 @@ def run_swarm(
     seconds: float | None = None,
     leave: threading.Event | None = None,
     progress: Progress | None = None,
+    accountant: Accountant | None = None,
 ) -> Progress:
     """Drive and send in real time for `seconds`, or until `stop` is set; then, if given, stay until `leave` is set.
 
-    `on_keyframe` is called for every keyframe handed to its rover; `progress` is kept up to date while it runs.
+    `on_keyframe` is called for every keyframe handed to its rover; `progress` is kept up to date while it runs, and
+    `accountant` looks at the rovers meanwhile and when they have left.
     """
     progress = progress or Progress()
     built = swarm(options)
     way = (options.connect, options.site, options.send, stop, options.tls)
     with fleet(names(options), built.camera, *way) as rovers:
-        for record in drive(built, rovers, RealTime(stop), time.time_ns(), seconds, progress):
+        for record in drive(built, rovers, RealTime(stop), options.now_ns(), seconds, progress):
             if on_keyframe:
                 on_keyframe(record)
+            if accountant:
+                accountant.look(rovers)
         if leave is not None:
             leave.wait()
+    if accountant:
+        accountant.tell(account(rover) for rover in rovers)
     return progress
 
 
