@@ -11,7 +11,8 @@ host = host.strip("[]")
 try:
     if os.environ.get("COVISTA_TLS_CERT"):
         # It asks itself, by whatever name: there is nobody to be mistaken for.
-        trusting = ssl._create_unverified_context()
+        trusting = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+        trusting.check_hostname, trusting.verify_mode = False, ssl.CERT_NONE
         station = HTTPSConnection(host, int(port), timeout=3, context=trusting)
     else:
         station = HTTPConnection(host, int(port), timeout=3)

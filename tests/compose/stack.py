@@ -57,7 +57,7 @@ def of_this_tree() -> Stack:
         "BASE_IMAGE": said([str(ROOT / "docker" / "base.sh")], within_s=600).strip(),
         # Compose of all versions names the operators' network by it.
         "COMPOSE_PROJECT_NAME": project,
-        "COVISTA_TAG": f"test-{os.getpid()}",
+        "COVISTA_TAG": "test",
         "COVISTA_API_AT": "127.0.0.1:0",
         "COVISTA_LINK_AT": "127.0.0.1:0",
     }

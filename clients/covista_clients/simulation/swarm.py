@@ -155,9 +155,13 @@ def camera(options: SwarmOptions) -> Camera:
 
 
 def swarm(options: SwarmOptions) -> Swarm:
-    """Build the world and lay out the paths."""
+    """Build the world and lay out the paths, as far as the swarm has come."""
     world = worlds.build(options.world, options.seed, options.robots)
-    return Swarm(options, world, camera(options), Paths(world, options.robots, options.seed))
+    paths = Paths(world, options.robots, options.seed)
+    for member in members(options):
+        # Late in a round this takes most of a second, which would be missing once messages are due.
+        paths.pose(member, come_so_far_s(options))
+    return Swarm(options, world, camera(options), paths)
 
 
 def run_swarm(
