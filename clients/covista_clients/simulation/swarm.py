@@ -211,6 +211,9 @@ def drive(
     """
     progress = progress or Progress()
     options = built.options
+    if not senders:
+        # Nothing would ever be due.
+        return
     sender_of = dict(zip(members(options), senders, strict=False))
     newest: dict[str, int] = {}
     schedule_all = schedule(options.robots, options.rate_hz, options.pose_rate_hz)
