@@ -105,7 +105,7 @@ def _open(settings: Settings) -> Switchboard:
     if settings.zenoh_tls is not None:
         follow_zenoh_log()
         lock = Lock(settings.zenoh_tls, settings.zenoh_tls_robots, settings.zenoh_tls_peers or DEFAULT_PEERS)
-    return Switchboard(opening(settings.link, settings.connect, settings.site, lock), lock)
+    return Switchboard(opening(settings.link, settings.connect, settings.site, lock), lock, waits=not settings.link)
 
 
 def _own_words(error: CovistaError) -> str:

@@ -7,7 +7,7 @@ import pytest
 from covista_schemas.errors import LinkError
 from covista_schemas.zenoh_tls import Tls
 
-from tests.system.certificates import issue, make_certificates, tls_of
+from tests.system.certificates import issue, make_certificates, make_expired, tls_of
 
 
 @pytest.fixture(scope="module")
@@ -44,14 +44,9 @@ def test_files_of_no_use_are_one_line(certs: Path, ca: str, cert: str, key: str,
     assert "\n" not in str(caught.value)
 
 
-def test_a_certificate_that_is_out_of_date_is_of_no_use(certs: Path, tmp_path: Path) -> None:
-    request = ["openssl", "req", "-new", "-key", certs / "r1.key", "-subj", "/CN=r1", "-out", tmp_path / "r1.csr"]
-    sign = ["openssl", "x509", "-req", "-in", tmp_path / "r1.csr", "-CA", certs / "ca.pem", "-CAkey", certs / "ca.key"]
-    sign += ["-set_serial", "7", "-days", "-1", "-out", tmp_path / "r1.pem"]
-    for command in (request, sign):
-        subprocess.run(command, check=True, capture_output=True)
+def test_a_certificate_that_is_out_of_date_is_of_no_use(certs: Path) -> None:
     with pytest.raises(LinkError, match="certificate has expired"):
-        Tls(certs / "ca.pem", tmp_path / "r1.pem", certs / "r1.key").common_name()
+        make_expired(certs, "r1").common_name()
 
 
 def test_names_of_files_have_a_place_for_the_robot() -> None:

@@ -3,7 +3,10 @@ from pathlib import Path
 
 import pytest
 from covista_schemas.reports import GroupBounds, Hysteresis, LiveSettings
+from covista_schemas.zenoh_tls import Tls
 from covista_service.config import Address, Settings, SettingsError, load, parse_address, with_stored
+
+LOCKED = {"zenoh_tls_ca": "ca.pem", "zenoh_tls_cert": "station.pem", "zenoh_tls_key": "station.key"}
 
 
 @pytest.fixture(autouse=True)
@@ -90,11 +93,37 @@ def test_a_setting_that_makes_no_sense_is_one_line_with_its_name(name: str, valu
         ({"gone_after_s": 1000}, "setting forget_after_s = 600 must not be less than live_after_s"),
         ({"decay_after_s": 900}, "setting decay_after_s = 900 must not be more than unknown_after_s"),
         ({"link": ""}, "setting link is empty, and so is connect"),
+        ({"zenoh_tls_ca": "ca.pem"}, "setting zenoh_tls_ca needs zenoh_tls_cert, zenoh_tls_key"),
+        ({"zenoh_tls_robots": "robots.txt"}, "setting zenoh_tls_robots needs zenoh_tls_ca, zenoh_tls_cert"),
+        ({"zenoh_tls_peers": "router"}, "setting zenoh_tls_peers needs zenoh_tls_ca, zenoh_tls_cert"),
+        (LOCKED, r"setting link \(--link, COVISTA_LINK\): 'tcp/127.0.0.1:7447' is a plain end point"),
+        (
+            LOCKED | {"connect": "tcp/router:7447"},
+            r"setting connect \(--connect, COVISTA_CONNECT\): 'tcp/router:7447' is",
+        ),
+        (LOCKED | {"link": "tls/0.0.0.0:7447"}, "setting zenoh_tls_ca needs zenoh_tls_robots"),
+        ({"link": "tls/0.0.0.0:7447"}, r"'tls/0.0.0.0:7447' needs certificates .* \(zenoh_tls_ca, zenoh_tls_cert"),
     ],
 )
 def test_settings_that_contradict_each_other_are_named(values: dict[str, object], said: str) -> None:
     with pytest.raises(SettingsError, match=said):
         load(values)
+
+
+def test_a_locked_link_has_three_files_and_a_list() -> None:
+    settings = load(LOCKED | {"link": "tls/0.0.0.0:7447", "zenoh_tls_robots": "robots.txt", "zenoh_tls_peers": "a, b"})
+    assert settings.zenoh_tls == Tls(Path("ca.pem"), Path("station.pem"), Path("station.key"))
+    assert settings.zenoh_tls_peers == ("a", "b")
+    assert load().zenoh_tls is None
+
+
+def test_who_joins_a_router_listens_only_where_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert load(LOCKED | {"connect": "tls/router:7447"}).link == ()
+    assert load({"connect": "tcp/router:7447", "link": "tcp/127.0.0.1:1"}).link == ("tcp/127.0.0.1:1",)
+    monkeypatch.setenv("COVISTA_CONNECT", "tcp/router:7447")
+    assert load().link == ()
+    monkeypatch.setenv("COVISTA_LINK", "tcp/127.0.0.1:2")
+    assert load().link == ("tcp/127.0.0.1:2",)
 
 
 def test_an_unknown_key_of_the_file_is_named_with_those_that_are_known(tmp_path: Path) -> None:

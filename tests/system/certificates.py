@@ -48,6 +48,17 @@ def make_certificates(folder: Path, *robots: str) -> Path:
     return folder
 
 
+def make_expired(folder: Path, name: str) -> Tls:
+    """A certificate for the key of one of them that was good until yesterday."""
+    tls, request, cert = tls_of(folder, name), folder / "expired.csr", folder / "expired.pem"
+    ask = ["openssl", "req", "-new", "-key", tls.key, "-subj", f"/CN={name}", "-out", request]
+    sign = ["openssl", "x509", "-req", "-in", request, "-CA", tls.ca, "-CAkey", folder / "ca.key"]
+    sign += ["-set_serial", "7", "-days", "-1", "-out", cert]
+    for command in (ask, sign):
+        subprocess.run(command, check=True, capture_output=True)
+    return Tls(tls.ca, cert, tls.key)
+
+
 def tls_of(folder: Path, name: str) -> Tls:
     """The files of one of them."""
     return Tls(folder / "ca.pem", folder / f"{name}.pem", folder / f"{name}.key")

@@ -79,8 +79,9 @@ def certificates(connect: str, ca: Path | None, cert: Path | None, key: Path | N
     absent = [name for name, file in given.items() if file is None]
     if 0 < len(absent) < len(given):
         raise LinkError(f"{', '.join(name for name in given if name not in absent)} needs {', '.join(absent)}")
+    check_endpoint(connect)
     try:
-        check_transport(check_endpoint(connect), not absent)
+        check_transport(connect, not absent)
     except LinkError as error:
         raise LinkError(f"--connect: {error} (--tls-ca, --tls-cert, --tls-key)") from error
     return Tls(ca, cert, key) if ca and cert and key else None

@@ -68,10 +68,10 @@ def nobody_answers(endpoint: str, tls: Tls | None) -> str:
 
 
 def nobody_listens(robot: str, tls: Tls) -> str:
-    """What is known where a router answers, and nobody wants to hear the robot."""
+    """What is known where nobody wants to hear the robot."""
     return (
-        f"there is a router, but no station that listens to {robot}: is it in the station's list of robots, by the "
-        f"name in {tls.cert}?"
+        f"no station listens to {robot}: is one there, and is the robot in its list of robots, by the name in "
+        f"{tls.cert}?"
     )
 
 

@@ -86,7 +86,8 @@ class Rover:
         self._tls = tls
         if session is None:
             self._check_way()
-        self._wonders_s = float("inf")
+        self._unheard_s: float | None = None
+        self._wondered = False
         self._token = liveliness
         self._outbox: Outbox[tuple[Pose, Callable[[], Content]]] = Outbox()
         self._stop = threading.Event()
@@ -189,10 +190,14 @@ class Rover:
         if self._tls is not None:
             warn_of_another_name(self.robot, self._tls)
 
-    def _wonder(self) -> None:
-        """Say once what it may be that nobody listens."""
-        if self._tls is not None and time.monotonic() > self._wonders_s:
-            self._wonders_s = float("inf")
+    def _wonder(self, heard: bool) -> None:
+        """Say once what it may be that nobody has listened for long: zenoh does not tell whom it keeps out."""
+        now_s = time.monotonic()
+        self._unheard_s = None if heard else self._unheard_s or now_s
+        if self._tls is None or self._wondered or self._unheard_s is None:
+            return
+        if now_s - self._unheard_s >= PATIENCE_S:
+            self._wondered = True
             logger.warning("%s", nobody_listens(self.robot, self._tls))
 
     def _check_open(self) -> None:
@@ -212,7 +217,6 @@ class Rover:
             if session is None:
                 return
             self._attach(session, owned=True)
-            self._wonders_s = time.monotonic() + PATIENCE_S
         link = self._link
         while link is not None and not self._outbox.closed:
             if self._doubts(link) and link.keyframes_wanted():
@@ -224,8 +228,7 @@ class Rover:
             if taken is not None:
                 self._send_keyframe(link, *taken)
             elif held or self._outbox.waits or self._in_doubt:
-                if not link.keyframes_wanted():
-                    self._wonder()
+                self._wonder(link.keyframes_wanted())
                 self._stop.wait(_LOOK_EVERY_S)
 
     def _patience_s(self, held: bool) -> float | None:

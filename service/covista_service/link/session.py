@@ -1,4 +1,8 @@
-"""The station's zenoh session: a router of its own, which rovers connect to and which may join other routers."""
+"""The station's zenoh session: a router of its own, which rovers connect to and which may join other routers.
+
+Where it is not to listen it is a client of a router. (As a router beside that one it now and then lost what robots sent
+right after the two had found each other.)
+"""
 
 from __future__ import annotations
 
@@ -29,10 +33,10 @@ def open_session(
 ) -> zenoh.Session:
     """Listen and join; `access` is who may do what (see `rules`), None for everybody everything.
 
-    A router that is not there yet is looked for until it is. Raises LinkError, whose text names the end points and the
-    flag to change them.
+    Who listens looks for routers that are not there yet until they are; who does not needs one now. Raises LinkError,
+    whose text names the end points and the flag to change them.
     """
-    made = config("router", listen=listen, connect=connect, tls=tls)
+    made = config("router" if listen else "client", listen=listen, connect=connect, tls=tls)
     if access is not None:
         made.insert_json5("access_control", json.dumps(access))
     made.insert_json5(f"{_DROP}/wait_before_drop", str(WAIT_US))
@@ -40,6 +44,8 @@ def open_session(
     try:
         return zenoh.open(made)
     except zenoh.ZError as error:
+        if not listen:
+            raise LinkError("no router answers") from error
         reason = _PLACE.sub("", str(error))
         raise LinkError(
             f"cannot listen on {', '.join(listen)}: {reason}; choose another end point with --link (COVISTA_LINK)"

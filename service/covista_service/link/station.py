@@ -32,7 +32,7 @@ class StationLink:
         self._options = options
         self._ingest: Ingest | None = None
         open_for = opening(options.listen, options.connect, options.site, options.lock)
-        self.switchboard = Switchboard(open_for, options.lock, alive=self._alive)
+        self.switchboard = Switchboard(open_for, options.lock, waits=not options.listen, alive=self._alive)
 
     def plug_ingest(self, mailboxes: Mailboxes) -> Part:
         """Hear robots, in this session and in those that come after it; returns how to end that."""
@@ -53,7 +53,7 @@ class StationLink:
         options = self._options
         places = ", ".join(each.split("#")[0] for each in (*options.listen, *options.connect))
         problem = self.switchboard.problem
-        if problem is None and not options.listen and not self.switchboard.joined:
+        if not problem and not options.listen and not self.switchboard.joined:
             problem = "no router answers"
         if problem is not None:
             return PartHealth(status="degraded", detail=f"{places}; {problem}")

@@ -46,7 +46,8 @@ def opening(listen: Sequence[str], connect: Sequence[str], site: str, lock: Lock
 class Switchboard:
     """Opens a session, and opens it anew when the files of `lock` change. Raises LinkError where it cannot be opened.
 
-    `alive` says which robots have a token, None where nobody knows.
+    With `waits` it need not open at once, and is tried until it does. `alive` says which robots have a token, None
+    where nobody knows.
     """
 
     def __init__(
@@ -54,6 +55,7 @@ class Switchboard:
         open_for: Open,
         lock: Lock | None = None,
         *,
+        waits: bool = False,
         alive: Callable[[], Collection[str] | None] = lambda: None,
         every_s: float = EVERY_S,
     ) -> None:
@@ -70,10 +72,10 @@ class Switchboard:
         self._hold = threading.RLock()
         self._joins: dict[object, Join] = {}
         self._parts: dict[object, Part] = {}
-        self._session: zenoh.Session | None = open_for(self._admission)
+        self._session: zenoh.Session | None = None if waits else open_for(self._admission)
         self._changed = threading.Condition()
-        self._asked = self._closing = False
-        self._thread = threading.Thread(target=self._run, name="covista-link") if lock else None
+        self._asked, self._closing = waits, False
+        self._thread = threading.Thread(target=self._run, name="covista-link") if lock or waits else None
         if self._thread:
             self._thread.start()
 
@@ -146,17 +148,16 @@ class Switchboard:
                 log.exception("looking after the link failed")
 
     def _look(self, asked: bool) -> None:
-        if self._lock is None or self._admission is None:
-            return
-        stamp = self._lock.stamp()
-        # Not while somebody writes: what has changed is looked at when it has stayed so since the last look.
-        settled, self._seen = stamp == self._seen, stamp
-        if asked or (settled and stamp != self._taken):
-            self._taken = stamp
-            self._read(self._lock)
+        if self._lock is not None:
+            stamp = self._lock.stamp()
+            # Not while somebody writes: what has changed is looked at when it has stayed so since the last look.
+            settled, self._seen = stamp == self._seen, stamp
+            if asked or (settled and stamp != self._taken):
+                self._taken = stamp
+                self._read(self._lock)
         if self._session is None:
             self._reopen()
-        if self._lock.robots is not None:
+        if self._lock is not None and self._lock.robots is not None and self._admission is not None:
             self.strangers.look(self._ask(lambda session: session.info.links()), self._admission, self._alive())
 
     def _read(self, lock: Lock) -> None:
@@ -182,14 +183,16 @@ class Switchboard:
         try:
             session = self._open(self._admission)
         except LinkError as error:
-            self._problem = f"cannot open again: {error}"
-            log.warning("zenoh cannot open again; tried once more soon", extra=about(said=str(error)))
+            problem = f"cannot open: {error}"
+            if problem != self._problem:
+                log.warning("zenoh cannot open; tried until it can", extra=about(said=str(error)))
+            self._problem = problem
             return
         with self._hold:
             self._session = session
             self._parts = {name: join(session) for name, join in self._joins.items()}
         self._problem = None
-        log.info("zenoh is open again; robots connect within seconds", extra=about(s=_seconds(begun_s)))
+        log.info("zenoh is open; robots connect within seconds", extra=about(s=_seconds(begun_s)))
 
     def _part(self) -> None:
         for name in reversed(list(self._parts)):

@@ -12,8 +12,6 @@ from typing import Literal
 from prometheus_client import CollectorRegistry, Gauge, GCCollector, Histogram, PlatformCollector, ProcessCollector
 from prometheus_client import Counter as PrometheusCounter
 
-from covista_service.perception.comparison import Outcome
-
 JobKind = Literal["extract", "compare", "build"]
 # What the loop does in its own thread: a whole turn; in it, reading overlaps from new surfaces, and what a Tick does.
 Stage = Literal["turn", "reading", "regroup"]
@@ -48,6 +46,9 @@ class Telemetry:
     """Counts of one station; written by the loop, read by anybody. `timer` gives seconds since any moment."""
 
     def __init__(self, timer: Callable[[], float] = time.perf_counter) -> None:
+        # Compiled maths comes with it, which who only logs has no use for.
+        from covista_service.perception.comparison import Outcome
+
         self.registry = CollectorRegistry()
         self.timer = timer
         self._received: Counter[str] = Counter()

@@ -190,6 +190,20 @@ def test_tokens_are_seen_also_those_from_before_and_lost(air: Air) -> None:
     ingest.close()
 
 
+def test_tokens_are_lost_with_the_session_and_seen_again_with_the_next(air: Air) -> None:
+    token = air.rover.liveliness().declare_token(keys.alive("parting", "r1", "b0"))
+    mailboxes = Mailboxes()
+    heard = Heard(mailboxes)
+    for round_number in (1, 2):
+        ingest = Ingest(air.station, "parting", mailboxes)
+        assert len(heard.of(TokenSeen, round_number)) == round_number
+        assert ingest.alive == {"r1"}
+        ingest.part()
+        assert heard.of(TokenLost, round_number) == [TokenLost("r1", "b0")] * round_number
+        assert not ingest.alive
+    token.undeclare()
+
+
 def test_after_the_end_nothing_is_taken_in(air: Air) -> None:
     mailboxes = Mailboxes()
     ingest = Ingest(air.station, "closed", mailboxes)

@@ -144,3 +144,35 @@ def test_events_that_nobody_takes_up_are_lost_and_counted(
     assert publisher.status() == SinkStatus(waiting=MAX_EVENTS, told=0, lost=7)
     go_on.set()
     wait_until(lambda: publisher.status() == SinkStatus(0, 1 + MAX_EVENTS, 7))
+
+
+def await_heard(air: Air, *listened: str) -> None:
+    """Wait until somebody who comes late has heard something on each of the keys."""
+    for key in listened:
+        heard: list[str] = []
+        with late_listener(air.rover, key, heard):
+            wait_until(heard.copy, key)
+
+
+def test_in_another_session_the_groups_that_stand_are_told_again(air: Air, publisher: Publisher) -> None:
+    scene, own, whole = two_robots(), keys.own_group(SITE, "r1"), keys.groups(SITE)
+    publisher.part()
+    news = news_of(scene)
+    publisher.take(news)
+    assert publisher.status() == SinkStatus(len(news.events) + len(news.robots), 0, 0)
+    for _ in range(2):
+        part = publisher.join(air.station)
+        wait_until(lambda: {own, whole} <= publisher.keys, "they are told")
+        wait_until(lambda: publisher.status().waiting == 0, "all is told")
+        await_heard(air, own, whole)
+        part()
+        assert not publisher.keys
+    assert publisher.status().lost == 0
+
+
+def test_what_waits_for_a_session_that_never_comes_is_counted_as_lost() -> None:
+    publisher = Publisher(None, "nowhere")
+    news = news_of(two_robots())
+    publisher.take(news)
+    publisher.close()
+    assert publisher.status().lost == len(news.events) + len(news.robots)

@@ -1,8 +1,13 @@
+import queue
+from collections.abc import Callable
+
 import pytest
+import zenoh
 from covista_schemas.errors import LinkError
 from covista_service.link.session import open_session
+from covista_service.link.switchboard import Switchboard, opening
 
-from tests.service.deadline import free_endpoint
+from tests.service.deadline import free_endpoint, wait_until
 from tests.service.link.conftest import Air
 
 
@@ -25,3 +30,29 @@ def test_an_address_that_is_not_ours_is_named() -> None:
 def test_a_router_that_is_not_there_does_not_keep_the_station_from_starting() -> None:
     session = open_session([free_endpoint()], [free_endpoint()])
     session.close()
+
+
+def test_who_only_joins_needs_a_router_now() -> None:
+    with pytest.raises(LinkError, match="no router answers"):
+        open_session([], [free_endpoint()])
+
+
+def test_a_switchboard_waits_for_a_router_and_plugs_in_when_there_is_one() -> None:
+    endpoint, heard = free_endpoint(), queue.SimpleQueue[str]()
+
+    def join(session: zenoh.Session) -> Callable[[], object]:
+        return session.declare_subscriber("waits/for", lambda sample: heard.put(sample.payload.to_string())).undeclare
+
+    switchboard = Switchboard(opening([], [endpoint], "default", None), waits=True, every_s=0.02)
+    try:
+        unplug = switchboard.plug(join)
+        wait_until(lambda: switchboard.problem == "cannot open: no router answers", "it says so")
+        with open_session([endpoint], []) as router:
+            wait_until(lambda: switchboard.joined and switchboard.problem is None, "they are joined")
+            publisher = router.declare_publisher("waits/for")
+            wait_until(lambda: publisher.matching_status.matching, "it listens")
+            publisher.put("here")
+            assert heard.get(timeout=5) == "here"
+        unplug()
+    finally:
+        switchboard.close()
