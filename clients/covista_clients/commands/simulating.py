@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -21,6 +22,7 @@ from covista_clients.commands.options import DEFAULT_CONNECT, Connect, Site, Tls
 from covista_clients.rover import Send
 
 if TYPE_CHECKING:
+    from covista_clients.simulation.accounts import Account
     from covista_clients.simulation.swarm import Progress, SwarmOptions
 
 CROWD_POSE_RATE_HZ = 1.0
@@ -29,6 +31,10 @@ WorldName = Annotated[str, typer.Option("--world", help="corner, boxes, shelf, w
 
 def swarm(
     robots: Annotated[int, typer.Option(min=1, help="How many rovers.")] = 6,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(metavar="ID", help="Drive this rover alone; repeatable. Other processes drive the rest."),
+    ] = None,
     world: WorldName = "arena",
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same swarm.")] = 0,
     rate: Annotated[float, typer.Option(help="Keyframes per second and rover.")] = 2.0,
@@ -44,11 +50,23 @@ def swarm(
     seconds: Annotated[
         float | None, typer.Option(min=0, help="End after so many seconds; a crowd counts from when it is heard.")
     ] = None,
+    clock_offset: Annotated[float, typer.Option(help="Seconds that the rovers' clocks are ahead.")] = 0.0,
+    accounts: Annotated[
+        float | None,
+        typer.Option(
+            min=0,
+            metavar="SECONDS",
+            help="Write so often, and at the end, what each rover has sent, as JSON; of a crowd at the end.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Drive simulated rovers through a rendered world, until Ctrl-C.
 
     More than 6 that send features are a crowd: their keyframes are made before they start, 12 for each of 24 robots,
     and up to a thousand robots send them from one process. Each 24 (6 outside of the arena) have a world of their own.
+
+    With --only, processes that are told the same of a swarm drive it together: where it is they know by the clock.
 
     In the names of --tls-cert and --tls-key {robot} stands for each robot's id; a crowd shares one certificate.
     """
@@ -59,12 +77,20 @@ def swarm(
         from covista_clients.simulation.swarm import SwarmOptions
 
         options = SwarmOptions(
-            robots=robots, world=world, seed=seed, rate_hz=rate, connect=connect, site=site, send=send.value
+            robots=robots,
+            world=world,
+            seed=seed,
+            rate_hz=rate,
+            connect=connect,
+            site=site,
+            send=send.value,
+            tls=tls,
+            clock_offset_s=clock_offset,
+            only=tuple(only or ()),
         )
-        options = replace(options, tls=tls)
         default_hz = CROWD_POSE_RATE_HZ if is_crowd(options) else options.pose_rate_hz
         options = replace(options, pose_rate_hz=default_hz if pose_rate is None else pose_rate)
-    progress = _run(options, seconds)
+    progress = _run(options, seconds, accounts)
     sent = f"{progress.keyframes} keyframes and {progress.poses} poses"
     print(f"{sent}, {progress.skipped} skipped, at most {progress.most_behind_s:.2f} s behind", file=sys.stderr)
 
@@ -96,21 +122,29 @@ def _simulation(command: str) -> Iterator[None]:
         raise CovistaError(str(error)) from error
 
 
-def _run(options: SwarmOptions, seconds: float | None) -> Progress:
+def _run(options: SwarmOptions, seconds: float | None, accounts: float | None) -> Progress:
     """Run a swarm in a thread of its own, so that Ctrl-C finds the main one waiting and the rovers leave in order."""
+    from covista_clients.simulation.accounts import Accountant
     from covista_clients.simulation.marching import is_crowd, run_crowd
     from covista_clients.simulation.swarm import run_swarm
 
+    accountant = None if accounts is None else Accountant(accounts, _tell)
     stop = threading.Event()
     run = partial(run_crowd, on_shot=_show) if is_crowd(options) else run_swarm
     with ThreadPoolExecutor(1, "swarm") as pool:
-        running = pool.submit(run, options, stop, seconds=seconds)
+        running = pool.submit(run, options, stop, seconds=seconds, accountant=accountant)
         with ends_by_interrupt():
-            where = f"{options.robots} rovers in {options.world} send to {options.connect}"
+            who = f"{', '.join(options.only)} of {options.robots}" if options.only else options.robots
+            where = f"{who} rovers in {options.world} send to {options.connect}"
             print(f"{where}; Ctrl-C ends.", file=sys.stderr)
             wait([running])
         stop.set()
         return running.result()
+
+
+def _tell(account: Account) -> None:
+    """One line of JSON."""
+    print(json.dumps(asdict(account)), flush=True)
 
 
 def _show(made: int, count: int) -> None:

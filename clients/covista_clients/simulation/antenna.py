@@ -13,6 +13,7 @@ from covista_schemas import codec, keys
 from covista_schemas.messages import Pose, PoseUpdate
 from covista_schemas.zenoh_tls import Tls
 
+from covista_clients.simulation.accounts import Account
 from covista_clients.simulation.fleet import shared_session
 
 
@@ -55,6 +56,11 @@ class Antenna:
         """Send a robot's keyframe, its picture as `codec.encode_picture` makes it."""
         data = codec.encode_taken(self._update(robot, self.keyframes, pose), picture)
         self._put(self._keyframe_keys[robot], data, codec.KEYFRAME_ENCODING, zenoh.Priority.DATA_LOW)
+
+    def accounts(self) -> list[Account]:
+        """What each robot has sent."""
+        counted = zip(self._names, self._boots, self.keyframes, self.poses, strict=True)
+        return [Account(*each) for each in counted]
 
     def close(self) -> None:
         """Let all robots leave."""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import takewhile
 
 import numpy as np
 
+from covista_clients.simulation.accounts import Accountant
 from covista_clients.simulation.antenna import Antenna, antenna
 from covista_clients.simulation.arena import ROVERS_PER_COURT
 from covista_clients.simulation.crowd import Crowd
@@ -39,7 +39,7 @@ class March:
 
 def is_crowd(options: SwarmOptions) -> bool:
     """Whether so many robots send features that pictures cannot be rendered while they drive."""
-    return options.send != "image" and options.robots > ROVERS_PER_COURT
+    return options.send != "image" and not options.only and options.robots > ROVERS_PER_COURT
 
 
 def stock_of(options: SwarmOptions) -> StockOptions:
@@ -60,10 +60,11 @@ def run_crowd(
     stop: threading.Event,
     seconds: float | None = None,
     on_shot: Callable[[int, int], None] | None = None,
+    accountant: Accountant | None = None,
 ) -> Progress:
     """Make keyframes, wait for a station, and send them in real time for `seconds`, or until `stop` is set.
 
-    `on_shot` hears how many of how many keyframes are made.
+    `on_shot` hears how many of how many keyframes are made, `accountant` at the end what was sent.
     """
     progress = Progress()
     stock = make(stock_of(options), stop, on_shot)
@@ -73,7 +74,9 @@ def run_crowd(
     with antenna(options.connect, options.site, crowd.names, stop, options.tls) as raised:
         if raised is not None and raised.await_heard(stop):
             plan = March(options.rate_hz, options.pose_rate_hz, seconds)
-            march(crowd, raised, plan, RealTime(stop, GRAIN_S), time.time_ns(), progress)
+            march(crowd, raised, plan, RealTime(stop, GRAIN_S), options.now_ns(), progress)
+    if accountant and raised is not None:
+        accountant.tell(raised.accounts())
     return progress
 
 

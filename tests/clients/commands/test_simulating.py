@@ -2,6 +2,7 @@ import json
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,15 @@ def test_a_swarm_sends_and_leaves(run: Run, endpoint: str, ground: Ground) -> No
     assert code == 0
     assert {keyframe.robot for keyframe in ground.keyframes} == {"r1", "r2"}
     assert "keyframes and" in err.splitlines()[-1]
+    ground.wait(lambda: not ground.tokens)
+
+
+def test_one_rover_of_a_swarm_drives_alone(run: Run, endpoint: str, ground: Ground) -> None:
+    arguments = ("--robots", "3", "--only", "r2", "--world", "wall", "--rate", "5", "--seconds", "0.5")
+    code, _, err = run("swarm", *arguments, "--connect", endpoint)
+    assert code == 0
+    assert {keyframe.robot for keyframe in ground.keyframes} == {"r2"}
+    assert err.splitlines()[0].startswith("r2 of 3 rovers in wall send to")
     ground.wait(lambda: not ground.tokens)
 
 
@@ -45,10 +55,33 @@ def test_a_crowd_sends_what_was_made_before(run: Run, endpoint: str, ground: Gro
     ground.wait(lambda: not ground.tokens)
 
 
+@pytest.mark.parametrize(("robots", "send"), [(2, "image"), (8, "features")])
+def test_a_swarm_says_what_it_has_sent(run: Run, endpoint: str, ground: Ground, robots: int, send: str) -> None:
+    arguments = ("--robots", robots, "--send", send, "--world", "wall", "--rate", 4, "--accounts", 60)
+    code, out, _ = run("swarm", *arguments, "--seconds", "0.5", "--connect", endpoint)
+    assert code == 0
+    told = [json.loads(line) for line in out.splitlines()]
+    ground.wait(lambda: len(ground.keyframes) == sum(account["keyframes"] for account in told))
+    ground.wait(lambda: len(ground.poses) == sum(account["poses"] for account in told))
+    assert {(account["robot"], account["boot"]) for account in told} == {(k.robot, k.boot) for k in ground.keyframes}
+
+
+def test_a_swarm_goes_by_the_clock_that_it_is_given(run: Run, endpoint: str, ground: Ground) -> None:
+    arguments = ("--robots", "1", "--world", "wall", "--seconds", "0.5", "--connect", endpoint)
+    before_ns = time.time_ns()
+    assert run("swarm", *arguments, "--clock-offset", "-86400")[0] == 0
+    ground.wait(lambda: ground.keyframes and ground.poses)
+    day_ns = 86_400 * 10**9
+    for said in (ground.keyframes[0], ground.poses[0]):
+        assert before_ns <= said.pose.time_ns + day_ns <= time.time_ns()
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
+        (("swarm", "--clock-offset", "nan"), "clock_offset_s = nan is not within 1e+09 s"),
         (("swarm", "--world", "moon"), "there is no world 'moon'"),
+        (("swarm", "--robots", "3", "--only", "r4"), "a swarm of 3 has no robot r4, but r1 to r3"),
         (("swarm", "--rate", "0"), "rate_hz must be positive"),
         (("swarm", "--rate", "inf"), "rate_hz must be positive"),
         (("swarm", "--pose-rate", "-1"), "pose_rate_hz not negative"),

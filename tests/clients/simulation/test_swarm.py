@@ -1,12 +1,23 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, field
+import time
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
 from covista_clients.simulation.pacing import AtOnce, Due, schedule
-from covista_clients.simulation.swarm import KeyframeRecord, Progress, Swarm, SwarmOptions, drive, names, swarm
+from covista_clients.simulation.swarm import (
+    ROUND_S,
+    KeyframeRecord,
+    Progress,
+    Swarm,
+    SwarmOptions,
+    come_so_far_s,
+    drive,
+    names,
+    swarm,
+)
 from covista_schemas.messages import Pose
 from numpy.typing import NDArray
 
@@ -84,6 +95,25 @@ def test_a_swarm_that_falls_behind_skips_and_says_so(built: Swarm) -> None:
     assert progress.keyframes == 21
 
 
+def test_rovers_driven_one_by_one_make_the_swarm_that_they_make_together() -> None:
+    whole, since_s = swarm(OPTIONS), ROUND_S - 0.5
+    for index, name in enumerate(names(OPTIONS)):
+        alone, recorder = swarm(replace(OPTIONS, only=(name,))), Recorder()
+        records = list(drive(alone, [recorder], AtOnce(), 10**18, 1.0, driven_s=since_s))
+        assert [record.robot for record in records] == [name, name]
+        for pose in recorder.poses:
+            t_s = (pose.time_ns - 10**18) / 1e9
+            # Where a round ends, the next one begins.
+            expected = whole.paths.pose(index, (since_s + t_s) % ROUND_S, pose.time_ns)
+            np.testing.assert_allclose(pose.position_m, expected.position_m, atol=1e-6)
+
+
+def test_rovers_of_a_swarm_that_others_drive_are_where_the_clock_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(time, "time", lambda: 7 * ROUND_S + 25.0)
+    assert come_so_far_s(OPTIONS) == 0.0
+    assert come_so_far_s(replace(OPTIONS, only=("r1",))) == pytest.approx(25.0)
+
+
 def test_the_schedule_spreads_rovers_over_the_period() -> None:
     due = list(itertools.islice(schedule(4, 2.0, 0.0), 8))
     assert due == [Due(k / 8, k % 4, True) for k in range(8)]
@@ -97,7 +127,12 @@ def test_the_schedule_is_in_order() -> None:
 
 @pytest.mark.parametrize(
     ("wrong", "reason"),
-    [({"robots": 0}, "at least 1"), ({"world": "moon"}, "arena"), ({"rate_hz": 0.0}, "rate_hz")],
+    [
+        ({"robots": 0}, "at least 1"),
+        ({"world": "moon"}, "arena"),
+        ({"rate_hz": 0.0}, "rate_hz"),
+        ({"robots": 2, "only": ("r1", "r3")}, "a swarm of 2 has no robot r3"),
+    ],
 )
 def test_options_that_make_no_sense_say_why(wrong: dict, reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
