@@ -51,8 +51,6 @@ def add(
     database: DatabaseOption = None,
 ) -> None:
     """Make a token and print it: it is shown this once and stored nowhere. A station that runs knows it at once."""
-    from sqlalchemy.engine import make_url
-
     from covista_service.access.scopes import Scope, written
     from covista_service.store.tokens import Tokens
 
@@ -64,8 +62,7 @@ def add(
             secret = tokens.add(name, held)
     except CovistaError as error:
         _refuse(error)
-    shown = make_url(where).set(query={}).render_as_string(hide_password=True)
-    typer.echo(f"token {name} ({written(held)}) in {shown}; it is not shown again:", err=True)
+    typer.echo(f"token {name} ({written(held)}) in {_shown(where)}; it is not shown again:", err=True)
     typer.echo(secret)
 
 
@@ -79,7 +76,8 @@ def list_tokens(
     from covista_service.store.tokens import Tokens
 
     try:
-        with closing(Tokens(_database(config, database))) as tokens:
+        where = _database(config, database)
+        with closing(Tokens(where)) as tokens:
             rows = [_row(each) for each in tokens.read()]
     except CovistaError as error:
         _refuse(error)
@@ -87,7 +85,7 @@ def list_tokens(
         typer.echo(json.dumps(rows, indent=1))
         return
     if not rows:
-        typer.echo("there are no tokens", err=True)
+        typer.echo(f"there are no tokens in {_shown(where)}", err=True)
         return
     titles = ("name", "scopes", "created", "last_used", "revoked")
     lines = [titles, *(tuple(row[title] or "-" for title in titles) for row in rows)]
@@ -123,6 +121,13 @@ def _database(config: Path | None, database: str | None) -> str:
     from covista_service.config import load
 
     return load({} if database is None else {"database": database}, config).database
+
+
+def _shown(database: str) -> str:
+    """The database as it may be read over somebody's shoulder."""
+    from sqlalchemy.engine import make_url
+
+    return make_url(database).set(query={}).render_as_string(hide_password=True)
 
 
 def _row(each: Token) -> dict[str, str | None]:
