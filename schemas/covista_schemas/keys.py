@@ -64,6 +64,11 @@ def alive(site: str, robot: str, boot: str) -> str:
     return f"{_robot(site, robot, RobotTopic.ALIVE)}/{check_id(boot, 'boot')}"
 
 
+def robot_prefix(site: str, robot: str) -> str:
+    """What all keys begin with that a robot says something on."""
+    return f"{ROOT}/{check_id(site, 'site')}/robots/{check_id(robot, 'robot')}"
+
+
 def every(site: str, topic: RobotTopic) -> str:
     """Subscription to one topic of all robots of a site."""
     tail = "/*" if topic is RobotTopic.ALIVE else ""
@@ -130,7 +135,7 @@ def parse_station_query(site: str, key: str) -> StationQuery:
 
 
 def _robot(site: str, robot: str, topic: RobotTopic) -> str:
-    return f"{ROOT}/{check_id(site, 'site')}/robots/{check_id(robot, 'robot')}/{topic}"
+    return f"{robot_prefix(site, robot)}/{topic}"
 
 
 def _station(site: str) -> str:

@@ -13,6 +13,7 @@ from typing import Literal
 import zenoh
 
 from covista_schemas.errors import LinkError
+from covista_schemas.zenoh_tls import Tls
 
 # What is larger is dropped without a word by whoever receives it, and the link is kept.
 MAX_MESSAGE_BYTES = 4 * 1024 * 1024
@@ -23,6 +24,7 @@ LEASE_MS = 2000
 # How often a router that does not answer is tried: soon at first, once a second in the end.
 RETRY = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
 _INTERNET = re.compile(r"(?:tcp|udp|tls|quic|ws)/(?:\[[0-9a-fA-F:.]+\]|[^\s/:\[\]]+):(?P<port>\d{1,5})(?:[?#]\S*)?")
+_OWN_TLS = re.compile("certificate|private_key|mtls|verify_name")
 _OTHER = re.compile(r"(?:unixsock-stream|unixpipe|serial|vsock)/\S+")
 
 
@@ -37,19 +39,38 @@ def check_endpoint(endpoint: str) -> str:
     raise LinkError(f"{endpoint!r} is not an end point such as tcp/127.0.0.1:7447")
 
 
+def check_transport(endpoint: str, locked: bool) -> None:
+    """Raise LinkError for a plain end point where there are certificates, and for one of TLS where there are none."""
+    secure, shown = endpoint.startswith("tls/"), repr(endpoint.split("#")[0])
+    if locked and not secure:
+        raise LinkError(f"{shown} is a plain end point; with certificates for zenoh it must be tls/")
+    if locked and has_own_tls(endpoint):
+        raise LinkError(f"{shown} must not have certificates of its own beside those for zenoh")
+    if secure and not locked and not has_own_tls(endpoint):
+        raise LinkError(f"{shown} needs certificates for zenoh: an authority, one's own, and its key")
+
+
+def has_own_tls(endpoint: str) -> bool:
+    """Whether the options of an end point say which certificates it takes; access control does not know of those."""
+    return endpoint.startswith("tls/") and _OWN_TLS.search(endpoint.partition("#")[2]) is not None
+
+
 def config(
     mode: Literal["client", "router"],
     *,
     connect: Sequence[str] = (),
     listen: Sequence[str] = (),
     timeout_ms: int = 1000,
+    tls: Tls | None = None,
 ) -> zenoh.Config:
     """Configuration of a session; `connect` and `listen` are end points such as tcp/127.0.0.1:7447.
 
-    A client that finds no router within `timeout_ms` fails to open. Raises LinkError for end points that cannot be.
+    A client that finds no router within `timeout_ms` fails to open. With `tls` both sides of a link prove who they are,
+    and no end point may be a plain one. Raises LinkError for end points that cannot be.
     """
     for endpoint in (*connect, *listen):
         check_endpoint(endpoint)
+        check_transport(endpoint, tls is not None)
     made = zenoh.Config()
     values: dict[str, object] = {
         "mode": mode,
@@ -66,9 +87,26 @@ def config(
         "transport/link/rx/max_message_size": MAX_MESSAGE_BYTES,
         "timestamping/enabled": True,
     }
+    if tls is not None:
+        values["transport/link/tls"] = _mutual(tls)
     for key, value in values.items():
         try:
             made.insert_json5(key, json.dumps(value))
         except zenoh.ZError as error:
             raise LinkError(f"zenoh refuses {key} = {value!r}: {error}") from error
     return made
+
+
+def _mutual(tls: Tls) -> dict[str, object]:
+    """Both sides show certificates, and who joins checks the name of whom it joins."""
+    return {
+        "root_ca_certificate": str(tls.ca),
+        "listen_certificate": str(tls.cert),
+        "listen_private_key": str(tls.key),
+        "connect_certificate": str(tls.cert),
+        "connect_private_key": str(tls.key),
+        "enable_mtls": True,
+        "verify_name_on_connect": True,
+        # Who was let in does not stay when its certificate is over.
+        "close_link_on_expiration": True,
+    }

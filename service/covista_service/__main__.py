@@ -16,6 +16,7 @@ from covista_service.evaluation.calibration_command import calibrate
 from covista_service.evaluation.command import evaluate
 from covista_service.evaluation.paper.command import paper
 from covista_service.evaluation.planted.command import planted
+from covista_service.router_command import Ca, Cert, Key, Robots, router
 from covista_service.settings_command import settings as list_settings
 from covista_service.token_command import token
 
@@ -59,32 +60,31 @@ def serve(
     insecure: Annotated[
         bool, typer.Option("--insecure", help="Listen beyond this machine without access control.")
     ] = False,
+    zenoh_tls_ca: Ca = None,
+    zenoh_tls_cert: Cert = None,
+    zenoh_tls_key: Key = None,
+    zenoh_tls_robots: Robots = None,
 ) -> None:
     """Run the station until a signal comes. Each flag is also a variable COVISTA_* and a key of the file."""
-    from covista_service.config import SettingsError, load, without_options
+    given = dict(locals())
+    from covista_service.config import FLAGS, SettingsError, load, without_options
+    from covista_service.link.zenoh_log import follow_zenoh_log
     from covista_service.serve import Running, run
     from covista_service.telemetry import log_to_stderr
 
-    flags = {
-        "api": api,
-        "link": link or None,
-        "connect": connect or None,
-        "database": database,
-        "workers": workers,
-        "insecure": insecure or None,
-    }
+    flags = {name: value for name, value in given.items() if name in FLAGS and value not in (None, False, [])}
     try:
-        settings = load({name: value for name, value in flags.items() if value is not None}, config)
+        settings = load(flags, config)
     except SettingsError as error:
         _refuse(str(error), EXIT_SETTINGS)
     log_to_stderr(settings.log_level, settings.log_format, settings.log_lines_per_minute)
 
     def tell(running: Running) -> None:
-        print(
-            f"API {running.url}/api/v1, docs {running.url}/docs, zenoh {', '.join(without_options(running.link))}",
-            flush=True,
-        )
+        zenoh = ", ".join(without_options(running.link or settings.connect))
+        print(f"API {running.url}/api/v1, docs {running.url}/docs, zenoh {zenoh}", flush=True)
 
+    if settings.zenoh_tls is not None:
+        follow_zenoh_log()
     try:
         run(settings, ready=tell)
     except CovistaError as error:
@@ -96,7 +96,7 @@ def _refuse(line: str, status: int) -> None:
     raise typer.Exit(status)
 
 
-for _command in (demo, evaluate, calibrate, paper, planted, bench):
+for _command in (router, demo, evaluate, calibrate, paper, planted, bench):
     application.command()(_command)
 application.add_typer(token)
 application.command("settings")(list_settings)

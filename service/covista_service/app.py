@@ -18,14 +18,14 @@ from covista_service.api import rest
 from covista_service.api.deps import Parts, State
 from covista_service.api.stream import Stream
 from covista_service.api.vitals import Vitals
-from covista_service.config import Settings, with_stored, without_options
+from covista_service.config import Settings, with_stored
 from covista_service.grouping.warming import warm_up
+from covista_service.link.admission import Lock
 from covista_service.link.inbox import Inbox
-from covista_service.link.ingest import Ingest
 from covista_service.link.mailbox import Mailboxes
 from covista_service.link.publish import Publisher
 from covista_service.link.queries import Queries
-from covista_service.link.session import open_session
+from covista_service.link.station import LinkOptions, StationLink
 from covista_service.loop import Loop
 from covista_service.station.options import StationOptions
 from covista_service.station.station import Station
@@ -79,11 +79,12 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
             # Closing waits for threads; the loop must go on, for they may be asking it something.
             stack.push_async_callback(asyncio.to_thread, close)
 
-        session = await asyncio.to_thread(open_session, settings.link, settings.connect)
-        close_later(session.close)
+        link = await asyncio.to_thread(StationLink, _link_options(settings))
+        close_later(link.switchboard.close)
         mailboxes = Mailboxes()
-        close_later(Ingest(session, settings.site, mailboxes).close)
-        publisher = Publisher(session, settings.site)
+        close_later(link.plug_ingest(mailboxes))
+        publisher = Publisher(None, settings.site)
+        link.switchboard.plug(publisher.join)
         close_later(publisher.close)
         archive = Archive(settings.database)
         close_later(archive.close)
@@ -111,13 +112,12 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
         task = asyncio.create_task(_run(loop), name="covista-loop")
         stack.push_async_callback(_end, task)
         history.follow(loop.ask)
-        close_later(Queries(session, settings.site, loop.ask).close)
-        link = PartHealth(status="ready", detail=", ".join(without_options((*settings.link, *settings.connect))))
+        close_later(link.switchboard.plug(lambda session: Queries(session, settings.site, loop.ask).close))
 
         def health_now() -> Health:
             moving = {"workers": _crew_health(workers, settings.workers)}
             moving |= {"store": history.health(), "loop": _loop_health(loop, task), "access": watch.health()}
-            return _health({"link": link, **moving})
+            return _health({"link": link.health(), **moving})
 
         def vitals_now() -> Vitals:
             return Vitals(
@@ -125,7 +125,8 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
                 crew=workers.status(),
                 sinks={"zenoh": publisher.status(), "history": history.status()},
                 turned_away=mailboxes.turned_away,
-                sessions=len(session.info.transports()),
+                sessions=link.switchboard.sessions,
+                link_refused=link.refused,
             )
 
         log.info("starts", extra=about(**settings.shown))
@@ -139,8 +140,16 @@ async def _open_parts(settings: Settings) -> AsyncIterator[Parts]:
             archive=archive,
             flush=history.flush,
             stream=stream,
+            renew=link.switchboard.renew,
         )
         log.info("stops", extra=about(surveys=telemetry.summary().surveys))
+
+
+def _link_options(settings: Settings) -> LinkOptions:
+    tls = settings.zenoh_tls
+    robots = settings.zenoh_tls_robots if settings.link else None
+    lock = None if tls is None else Lock(tls, robots, settings.zenoh_tls_peers)
+    return LinkOptions(settings.link, settings.connect, settings.site, lock)
 
 
 def _open_gate(settings: Settings, close_later: Callable[[Callable[[], object]], None]) -> tuple[Gate, TokenWatch]:

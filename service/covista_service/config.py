@@ -13,7 +13,8 @@ from urllib.parse import urlsplit
 from covista_schemas.errors import CovistaError, LinkError
 from covista_schemas.keys import ID_PATTERN
 from covista_schemas.settings import Hysteresis, LiveSettings, Patch, patched
-from covista_schemas.zenoh_config import check_endpoint
+from covista_schemas.zenoh_config import check_endpoint, check_transport
+from covista_schemas.zenoh_tls import Tls
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, ValidationError, model_validator
 from pydantic_settings import (
     BaseSettings,
@@ -30,7 +31,19 @@ log = logging.getLogger(__name__)
 
 PREFIX = "COVISTA_"
 # Settings that are flags of `serve` too.
-FLAGS = ("api", "link", "connect", "database", "workers", "insecure")
+FLAGS = (
+    "api",
+    "link",
+    "connect",
+    "database",
+    "workers",
+    "insecure",
+    "zenoh_tls_ca",
+    "zenoh_tls_cert",
+    "zenoh_tls_key",
+    "zenoh_tls_robots",
+)
+_ZENOH_TLS = ("zenoh_tls_ca", "zenoh_tls_cert", "zenoh_tls_key")
 # What pydantic-settings says of a variable that has several values and is not JSON.
 _UNREAD = r'error parsing value for field "(\w+)" from source'
 
@@ -44,6 +57,11 @@ class Address(NamedTuple):
 
     host: str
     port: int
+
+
+def flag_of(name: str) -> str:
+    """The flag of a setting that has one."""
+    return f"--{name.replace('_', '-')}"
 
 
 def without_options(endpoints: Iterable[str]) -> tuple[str, ...]:
@@ -105,6 +123,7 @@ def _split(value: object) -> object:
 
 Endpoints = Annotated[tuple[Annotated[str, AfterValidator(_check_endpoint)], ...], NoDecode, BeforeValidator(_split)]
 Origins = Annotated[tuple[Annotated[str, AfterValidator(_check_origin)], ...], NoDecode, BeforeValidator(_split)]
+Names = Annotated[tuple[Annotated[str, Field(min_length=1, max_length=200)], ...], NoDecode, BeforeValidator(_split)]
 Seconds = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False)]
 
 
@@ -124,7 +143,8 @@ class Settings(LiveSettings, BaseSettings):
         default="127.0.0.1:8000", description="HOST:PORT that the REST interface listens on; port 0 takes a free one."
     )
     link: Endpoints = Field(
-        default=("tcp/127.0.0.1:7447",), description="zenoh end points to listen on, separated by commas."
+        default=("tcp/127.0.0.1:7447",),
+        description="zenoh end points to listen on, separated by commas; none by default where connect is set.",
     )
     connect: Endpoints = Field(default=(), description="zenoh routers to join, separated by commas.")
     site: str = Field(default="default", pattern=f"^{ID_PATTERN}$", description="Second chunk of every key expression.")
@@ -153,6 +173,21 @@ class Settings(LiveSettings, BaseSettings):
     )
     tls_cert: Path | None = Field(default=None, description="PEM file with the REST interface's certificate and chain.")
     tls_key: Path | None = Field(default=None, description="PEM file with the key of tls_cert, without a password.")
+    zenoh_tls_ca: Path | None = Field(
+        default=None, description="PEM file with the authority of all certificates on zenoh, the robots' and our own."
+    )
+    zenoh_tls_cert: Path | None = Field(default=None, description="PEM file with the certificate shown on zenoh.")
+    zenoh_tls_key: Path | None = Field(
+        default=None, description="PEM file with the key of zenoh_tls_cert, without a password."
+    )
+    zenoh_tls_robots: Path | None = Field(
+        default=None,
+        description="File with the ids of the robots that are let in on zenoh, one a line; # for comments.",
+    )
+    zenoh_tls_peers: Names = Field(
+        default=(),
+        description="Common names of certificates that may do all on zenoh besides our own, separated by commas.",
+    )
     log_level: Literal["debug", "info", "warning", "error"] = Field(default="info", description="Least level to log.")
     log_format: Literal["text", "json"] = Field(default="text", description="A line of words, or a JSON object.")
     log_lines_per_minute: int = Field(
@@ -185,6 +220,7 @@ class Settings(LiveSettings, BaseSettings):
         # What is asked of a database, or configures an end point, may hold a key.
         shown["database"] = make_url(self.database).set(query={}).render_as_string(hide_password=True)
         shown |= {"link": ", ".join(without_options(self.link)), "connect": ", ".join(without_options(self.connect))}
+        shown["zenoh_tls_peers"] = ", ".join(self.zenoh_tls_peers)
         shown["cors_origins"] = ", ".join(self.cors_origins)
         return shown
 
@@ -192,6 +228,49 @@ class Settings(LiveSettings, BaseSettings):
     def live(self) -> LiveSettings:
         """Those settings that can change while the station runs."""
         return LiveSettings.model_validate({name: getattr(self, name) for name in LiveSettings.model_fields})
+
+    @property
+    def zenoh_tls(self) -> Tls | None:
+        """The certificates for zenoh, where there are any."""
+        if self.zenoh_tls_ca is None or self.zenoh_tls_cert is None or self.zenoh_tls_key is None:
+            return None
+        return Tls(self.zenoh_tls_ca, self.zenoh_tls_cert, self.zenoh_tls_key)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _join_only(cls, given: object) -> object:
+        """Who joins a router listens where told to, and nowhere else."""
+        if isinstance(given, dict) and given.get("connect") and "link" not in given:
+            return {**given, "link": ()}
+        return given
+
+    @model_validator(mode="after")
+    def _check_zenoh_tls(self) -> Self:
+        files = {name: getattr(self, name) for name in _ZENOH_TLS}
+        absent = [name for name, file in files.items() if file is None]
+        if 0 < len(absent) < len(files):
+            given = ", ".join(name for name in files if name not in absent)
+            raise ValueError(
+                f"setting {given} needs {', '.join(absent)}: zenoh takes an authority, a certificate, a key"
+            )
+        if absent and (self.zenoh_tls_robots is not None or self.zenoh_tls_peers):
+            name = "zenoh_tls_peers" if self.zenoh_tls_robots is None else "zenoh_tls_robots"
+            raise ValueError(f"setting {name} needs {', '.join(absent)}: without certificates nobody is known")
+        for name, endpoints in (("link", self.link), ("connect", self.connect)):
+            self._check_transports(name, endpoints, locked=not absent)
+        if not absent and self.link and self.zenoh_tls_robots is None:
+            raise ValueError("setting zenoh_tls_ca needs zenoh_tls_robots: without a list no robot would be let in")
+        return self
+
+    @staticmethod
+    def _check_transports(name: str, endpoints: tuple[str, ...], *, locked: bool) -> None:
+        for endpoint in endpoints:
+            try:
+                check_transport(endpoint, locked)
+            except LinkError as error:
+                raise ValueError(
+                    f"setting {name} (--{name}, {PREFIX}{name.upper()}): {error} ({', '.join(_ZENOH_TLS)})"
+                ) from error
 
     @model_validator(mode="after")
     def _check_order(self) -> Self:
@@ -290,7 +369,7 @@ def _one_line(error: ValidationError) -> str:
     if name not in known:
         return f"setting {name} is not known; known are {', '.join(known)}"
     reasons = dict.fromkeys(each["msg"].removeprefix("Value error, ") for each in found if each["loc"][0] == name)
-    flag = f"--{name}, " if name in FLAGS else ""
+    flag = f"{flag_of(name)}, " if name in FLAGS else ""
     variable, description = PREFIX + name.upper(), known[name].description
     inner = found[0]["loc"][1:]
     if known[name].annotation is Hysteresis and inner:

@@ -89,7 +89,34 @@ async def _serve(
         parts: Parts = (state or {})["parts"]
         return Connection(**given, given_up=parts.outgoing.given_up, listening=lambda: parts.stream.listeners)
 
-    server = _Server(
+    def renew_link() -> None:
+        if state is not None:
+            state["parts"].renew()
+
+    server = _server(stateful, connection, certificates)
+    # The lifespan is entered here and not by the server, so that what goes wrong comes out as an exception.
+    heard = _SIGNALS if signals else ()
+    renews: list[Callable[[], object]] = [] if certificates is None else [certificates.renew]
+    if settings.zenoh_tls is not None:
+        renews.append(renew_link)
+    with _stopped_by(heard, server.stop), _renewed(certificates, renews, signals=signals):
+        async with app.router.lifespan_context(app) as state:
+            if state is None:
+                raise StartError("the application has no parts")
+            parts: Parts = state["parts"]
+            running = Running(_url(settings, listener), settings.link, parts.telemetry.summary, server.stop)
+            server.when_started = (lambda: ready(running)) if ready else _nothing
+            server.when_stopping = parts.stream.close
+            settling = asyncio.create_task(_settle(parts), name="covista-settling")
+            try:
+                await server.serve([listener])
+            finally:
+                settling.cancel()
+
+
+def _server(stateful: Any, connection: Callable[..., Connection], certificates: Certificates | None) -> _Server:
+    """The server of one application; it speaks TLS where there is a certificate."""
+    return _Server(
         uvicorn.Config(
             stateful,
             # Called for each connection like the class that it stands for.
@@ -105,21 +132,6 @@ async def _serve(
             timeout_graceful_shutdown=_GRACE_S,
         )
     )
-    # The lifespan is entered here and not by the server, so that what goes wrong comes out as an exception.
-    heard = _SIGNALS if signals else ()
-    with _stopped_by(heard, server.stop), _renewed(certificates, signals=signals):
-        async with app.router.lifespan_context(app) as state:
-            if state is None:
-                raise StartError("the application has no parts")
-            parts: Parts = state["parts"]
-            running = Running(_url(settings, listener), settings.link, parts.telemetry.summary, server.stop)
-            server.when_started = (lambda: ready(running)) if ready else _nothing
-            server.when_stopping = parts.stream.close
-            settling = asyncio.create_task(_settle(parts), name="covista-settling")
-            try:
-                await server.serve([listener])
-            finally:
-                settling.cancel()
 
 
 async def _settle(parts: Parts) -> None:
@@ -182,20 +194,20 @@ def _certificates(settings: Settings) -> Certificates | None:
 
 
 @contextmanager
-def _renewed(certificates: Certificates | None, *, signals: bool) -> Iterator[None]:
-    """Have the certificate renewed when its files change, and at SIGHUP."""
-    if certificates is None:
-        yield
-        return
+def _renewed(
+    certificates: Certificates | None, renews: Sequence[Callable[[], object]], *, signals: bool
+) -> Iterator[None]:
+    """Have the certificate renewed when its files change, and all that `renews` at SIGHUP."""
     loop = asyncio.get_running_loop()
-    hears = signals and threading.current_thread() is threading.main_thread()
+    hears = bool(renews) and signals and threading.current_thread() is threading.main_thread()
     if hears:
-        loop.add_signal_handler(signal.SIGHUP, certificates.renew)
-    task = asyncio.create_task(_watch(certificates))
+        loop.add_signal_handler(signal.SIGHUP, lambda: [renew() for renew in renews])
+    task = None if certificates is None else asyncio.create_task(_watch(certificates))
     try:
         yield
     finally:
-        task.cancel()
+        if task is not None:
+            task.cancel()
         if hears:
             loop.remove_signal_handler(signal.SIGHUP)
 

@@ -38,7 +38,7 @@ def every() -> Iterator[Setting]:
     """All settings, those that can be changed while the station runs last."""
     from covista_schemas.reports import Hysteresis, LiveSettings
 
-    from covista_service.config import FLAGS, PREFIX, Settings
+    from covista_service.config import FLAGS, PREFIX, Settings, flag_of
 
     schema = Settings.model_json_schema()
     live = list(LiveSettings.model_fields)
@@ -50,7 +50,7 @@ def every() -> Iterator[Setting]:
             for part, inner in Hysteresis.model_fields.items():
                 yield _setting(f"{name}.{part}", f"{PREFIX}{name}__{part}".upper(), "", parts[part], inner)
             continue
-        yield _setting(name, PREFIX + name.upper(), f"--{name}" if name in FLAGS else "", said, field)
+        yield _setting(name, PREFIX + name.upper(), flag_of(name) if name in FLAGS else "", said, field)
 
 
 def markdown(listed: list[Setting]) -> Iterator[str]:

@@ -1,6 +1,7 @@
 import pytest
 from covista_schemas.errors import LinkError
 from covista_schemas.zenoh_config import check_endpoint, config
+from covista_schemas.zenoh_tls import Tls
 
 GOOD = [
     "tcp/127.0.0.1:7447",
@@ -27,8 +28,27 @@ BAD = [
 @pytest.mark.parametrize("endpoint", GOOD)
 def test_end_points_are_taken(endpoint: str) -> None:
     assert check_endpoint(endpoint) == endpoint
-    assert config("client", connect=[endpoint])
-    assert config("router", listen=[endpoint])
+    tls = Tls("ca.pem", "r1.pem", "r1.key") if endpoint.startswith("tls/") else None
+    assert config("client", connect=[endpoint], tls=tls)
+    assert config("router", listen=[endpoint], tls=tls)
+
+
+@pytest.mark.parametrize(
+    ("endpoint", "tls", "said"),
+    [
+        ("tcp/10.0.0.1:7447", True, "is a plain end point"),
+        ("unixsock-stream//tmp/covista.sock", True, "is a plain end point"),
+        ("tls/station:7447", False, "needs certificates"),
+        ("tls/station:7447#enable_mtls=false", True, "must not have certificates of its own"),
+        ("tls/station:7447#listen_private_key_base64=secret", True, "must not have certificates of its own"),
+    ],
+)
+def test_end_points_are_all_locked_or_none(endpoint: str, tls: bool, said: str) -> None:
+    files = Tls("ca.pem", "r1.pem", "r1.key") if tls else None
+    for place in ("connect", "listen"):
+        with pytest.raises(LinkError, match=said) as caught:
+            config("router", **{place: [endpoint]}, tls=files)
+        assert "secret" not in str(caught.value)
 
 
 @pytest.mark.parametrize("endpoint", BAD)

@@ -5,6 +5,10 @@ import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
+from covista_schemas.zenoh_tls import Tls
+
+CERTS = Path(__file__).parents[2] / "docker" / "certs.sh"
+
 
 @dataclass(frozen=True)
 class Pair:
@@ -36,3 +40,14 @@ def put(source: Pair, target: Pair) -> None:
         beside = place.with_suffix(".new")
         beside.write_bytes(new.read_bytes())
         os.replace(beside, place)
+
+
+def make_certificates(folder: Path, *robots: str) -> Path:
+    """An authority, and certificates for station, router and robots, by the script that operators have."""
+    subprocess.run([CERTS, folder, *robots], check=True, capture_output=True)
+    return folder
+
+
+def tls_of(folder: Path, name: str) -> Tls:
+    """The files of one of them."""
+    return Tls(folder / "ca.pem", folder / f"{name}.pem", folder / f"{name}.key")

@@ -8,6 +8,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from covista_schemas.errors import LinkError
+from covista_schemas.zenoh_config import check_endpoint, check_transport
+from covista_schemas.zenoh_tls import Tls
 
 from covista_clients.mission_control import MissionControl
 
@@ -53,10 +56,34 @@ Limit = Annotated[int, typer.Option(min=1, help="At most so many entries.")]
 Connect = Annotated[
     str, typer.Option(metavar="ENDPOINT", help="End point of the station's zenoh link, or of a router.")
 ]
+TlsCa = Annotated[
+    Path | None,
+    typer.Option(envvar="COVISTA_ZENOH_TLS_CA", metavar="FILE", help="PEM file with the certificates' authority."),
+]
+TlsCert = Annotated[
+    Path | None,
+    typer.Option(envvar="COVISTA_ZENOH_TLS_CERT", metavar="FILE", help="PEM file with the certificate of the robot."),
+]
+TlsKey = Annotated[
+    Path | None, typer.Option(envvar="COVISTA_ZENOH_TLS_KEY", metavar="FILE", help="PEM file with its key.")
+]
 Site = Annotated[str, typer.Option(help="Site that the station looks after.")]
 
 DEFAULT_URL = "http://127.0.0.1:8000"
 DEFAULT_CONNECT = "tcp/127.0.0.1:7447"
+
+
+def certificates(connect: str, ca: Path | None, cert: Path | None, key: Path | None) -> Tls | None:
+    """The files that the options name, all or none, for an end point that wants them or does not. Raises LinkError."""
+    given = {"--tls-ca": ca, "--tls-cert": cert, "--tls-key": key}
+    absent = [name for name, file in given.items() if file is None]
+    if 0 < len(absent) < len(given):
+        raise LinkError(f"{', '.join(name for name in given if name not in absent)} needs {', '.join(absent)}")
+    try:
+        check_transport(check_endpoint(connect), not absent)
+    except LinkError as error:
+        raise LinkError(f"--connect: {error} (--tls-ca, --tls-cert, --tls-key)") from error
+    return Tls(ca, cert, key) if ca and cert and key else None
 
 
 def station(url: str, token: str | None, authorities: Path | None) -> MissionControl:

@@ -17,9 +17,9 @@ from covista_schemas.reports import KeyframeId, RobotReport
 from covista_schemas.zenoh_config import config
 from pydantic import ValidationError
 
-from covista_clients.commands.options import DEFAULT_CONNECT, Connect, Site
+from covista_clients.commands.options import DEFAULT_CONNECT, Connect, Site, TlsCa, TlsCert, TlsKey, certificates
 from covista_clients.rover import Rover
-from covista_clients.rover.link import ask_report
+from covista_clients.rover.link import ask_report, nobody_answers, nobody_listens, warn_of_another_name
 
 _ASK_EVERY_S = 0.05
 
@@ -34,19 +34,31 @@ def send(
     pose: Annotated[str, typer.Option(help='"x y z qx qy qz qw": metres, and the unit quaternion world_from_camera.')],
     connect: Connect = DEFAULT_CONNECT,
     wait: Annotated[float, typer.Option(min=0, help="Seconds to wait for the station's confirmation.")] = 5.0,
+    tls_ca: TlsCa = None,
+    tls_cert: TlsCert = None,
+    tls_key: TlsKey = None,
     site: Site = "default",
 ) -> None:
     """Send one keyframe, and end well when the station has confirmed it."""
     picture, taken_by, taken_from = _read(image), _read_camera(camera), _read_pose(pose)
+    tls = certificates(connect, tls_ca, tls_cert, tls_key)
+    if tls is not None:
+        warn_of_another_name(robot, tls)
     deadline_s = time.monotonic() + wait
     try:
-        session = zenoh.open(config("client", connect=[connect], timeout_ms=round(wait * 1000)))
+        session = zenoh.open(config("client", connect=[connect], timeout_ms=round(wait * 1000), tls=tls))
     except zenoh.ZError as error:
-        raise LinkError(f"no router at {connect} within {wait:g} s") from error
+        why = "" if tls is None else f": {nobody_answers(connect, tls)}"
+        raise LinkError(f"no router at {connect} within {wait:g} s{why}") from error
     with session, _left_at_once(_rover(robot, taken_by, site, session)) as rover:
         dropped_before = _dropped(_ask(session, site, robot, deadline_s))
         keyframe = _hand_over(rover, picture, taken_from)
-        _wait_until_in_use(session, rover, keyframe, dropped_before, deadline_s)
+        try:
+            _wait_until_in_use(session, rover, keyframe, dropped_before, deadline_s)
+        except LinkError as error:
+            if tls is None or rover.keyframes_sent:
+                raise
+            raise LinkError(nobody_listens(robot, tls)) from error
     print(f"{robot}: the station has the keyframe, {keyframe.sequence} of boot {keyframe.boot}")
 
 

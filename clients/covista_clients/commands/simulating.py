@@ -16,10 +16,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from covista_schemas import keys
 from covista_schemas.errors import CovistaError, MissingExtraError
-from covista_schemas.zenoh_config import check_endpoint
 
 from covista_clients.commands.interrupting import ends_by_interrupt
-from covista_clients.commands.options import DEFAULT_CONNECT, Connect, Site
+from covista_clients.commands.options import DEFAULT_CONNECT, Connect, Site, TlsCa, TlsCert, TlsKey, certificates
 from covista_clients.rover import Send
 
 if TYPE_CHECKING:
@@ -36,6 +35,9 @@ def swarm(
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same swarm.")] = 0,
     rate: Annotated[float, typer.Option(help="Keyframes per second and rover.")] = 2.0,
     connect: Connect = DEFAULT_CONNECT,
+    tls_ca: TlsCa = None,
+    tls_cert: TlsCert = None,
+    tls_key: TlsKey = None,
     site: Site = "default",
     send: Annotated[Send, typer.Option(help="What the rovers make of their pictures.")] = Send.IMAGE,
     pose_rate: Annotated[
@@ -59,8 +61,10 @@ def swarm(
 
     More than 6 that send features are a crowd: their keyframes are made before they start, 12 for each of 24 robots,
     and up to a thousand robots send them from one process. Each 24 (6 outside of the arena) have a world of their own.
+
+    In the names of --tls-cert and --tls-key {robot} stands for each robot's id; a crowd shares one certificate.
     """
-    check_endpoint(connect)
+    tls = certificates(connect, tls_ca, tls_cert, tls_key)
     keys.check_id(site, "site")
     with _simulation("covista swarm"):
         from covista_clients.simulation.marching import is_crowd
@@ -76,6 +80,7 @@ def swarm(
             send=send.value,
             clock_offset_s=clock_offset,
         )
+        options = replace(options, tls=tls)
         default_hz = CROWD_POSE_RATE_HZ if is_crowd(options) else options.pose_rate_hz
         options = replace(options, pose_rate_hz=default_hz if pose_rate is None else pose_rate)
     progress = _run(options, seconds, accounts)

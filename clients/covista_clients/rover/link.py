@@ -16,6 +16,7 @@ from covista_schemas import codec, keys
 from covista_schemas.errors import LinkError
 from covista_schemas.reports import KeyframeId, OwnGroupReport, Problem, RobotReport
 from covista_schemas.zenoh_config import config
+from covista_schemas.zenoh_tls import Tls
 from pydantic import ValidationError
 
 logger = logging.getLogger(__name__)
@@ -23,6 +24,8 @@ logger = logging.getLogger(__name__)
 # Long enough for a slow network, short enough for a rover that is closed while it still looks for a router.
 OPEN_TIMEOUT_MS = 1500
 _PAUSE_S = 0.1
+# After so long it is told that nobody answers, or listens, and what it may be.
+PATIENCE_S = 5.0
 _ASK_EVERY_S = 0.03
 # After a router came back all its rovers ask at once: they ask again at different times.
 _ASK_AGAIN_S = (0.03, 0.2)
@@ -36,15 +39,49 @@ _CALLBACK_END_S = 2.0
 OnGroup = Callable[[OwnGroupReport], object]
 
 
-def open_with_retry(endpoint: str, stop: threading.Event) -> zenoh.Session | None:
-    """A session as client of the router at `endpoint`, as soon as there is one; None once `stop` is set."""
+def open_with_retry(endpoint: str, stop: threading.Event, tls: Tls | None = None) -> zenoh.Session | None:
+    """A session as client of the router at `endpoint`, as soon as there is one; None once `stop` is set.
+
+    When it takes long a warning says what it may be, once.
+    """
+    told_s = time.monotonic() + PATIENCE_S
     while not stop.is_set():
         try:
-            return zenoh.open(config("client", connect=[endpoint], timeout_ms=OPEN_TIMEOUT_MS))
+            return zenoh.open(config("client", connect=[endpoint], timeout_ms=OPEN_TIMEOUT_MS, tls=tls))
         except zenoh.ZError as error:
             logger.debug("no router at %s yet: %s", endpoint, error)
+        if time.monotonic() >= told_s:
+            told_s = float("inf")
+            logger.warning("%s", nobody_answers(endpoint, tls))
         stop.wait(_PAUSE_S)
     return None
+
+
+def nobody_answers(endpoint: str, tls: Tls | None) -> str:
+    """What is known of a router that does not answer: zenoh does not say why."""
+    if tls is None:
+        return f"nobody answers at {endpoint}: is a station there, and does it take links without a certificate?"
+    return (
+        f"nobody answers at {endpoint}: is a station there, does its certificate name this host, and are its "
+        f"certificate and ours ({tls.cert}) both of the authority {tls.ca}?"
+    )
+
+
+def nobody_listens(robot: str, tls: Tls) -> str:
+    """What is known where a router answers, and nobody wants to hear the robot."""
+    return (
+        f"there is a router, but no station that listens to {robot}: is it in the station's list of robots, by the "
+        f"name in {tls.cert}?"
+    )
+
+
+def warn_of_another_name(robot: str, tls: Tls) -> None:
+    """A robot that shows the certificate of another one is not heard, and not told so. Raises LinkError, see Tls."""
+    name = tls.common_name()
+    if name != robot:
+        logger.warning(
+            "%s shows the certificate of %s: unless that may speak for all, the station does not hear it", robot, name
+        )
 
 
 def follow(session: zenoh.Session, key: str, handler: Any) -> zenoh.ext.AdvancedSubscriber[Any]:

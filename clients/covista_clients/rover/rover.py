@@ -17,11 +17,19 @@ from covista_schemas import codec, keys
 from covista_schemas.errors import LinkError
 from covista_schemas.messages import Camera, Keyframe, Pose, PoseUpdate
 from covista_schemas.reports import KeyframeId, RobotReport
-from covista_schemas.zenoh_config import check_endpoint
+from covista_schemas.zenoh_config import check_endpoint, check_transport
+from covista_schemas.zenoh_tls import Tls
 
 from covista_clients.rover.content import Content, Image, Send, prepare
 from covista_clients.rover.last_words import LastWords
-from covista_clients.rover.link import OnGroup, RoverLink, open_with_retry
+from covista_clients.rover.link import (
+    PATIENCE_S,
+    OnGroup,
+    RoverLink,
+    nobody_listens,
+    open_with_retry,
+    warn_of_another_name,
+)
 from covista_clients.rover.outbox import Outbox
 
 logger = logging.getLogger(__name__)
@@ -56,11 +64,14 @@ class Rover:
         session: zenoh.Session | None = None,
         boot: str | None = None,
         liveliness: bool = True,
+        tls: Tls | None = None,
     ) -> None:
         """`send` says what becomes of pictures: image (JPEG), features, or features+thumbnail.
 
-        With `session` the rover speaks over an open session, which stays open. Raises ValueError for ids that are
-        none, and LinkError for an end point that cannot be one.
+        With `session` the rover speaks over an open session, which stays open. With `tls` it proves who it is, by a
+        certificate whose common name is the robot's id, to a station that does so too, at an end point such as
+        tls/station:7447. Raises ValueError for ids that are none, and LinkError for an end point that cannot be one,
+        or files of `tls` that are of no use.
         """
         self.robot, self.site = keys.check_id(robot, "robot"), keys.check_id(site, "site")
         self.boot = keys.check_id(boot, "boot") if boot is not None else uuid.uuid4().hex
@@ -71,7 +82,11 @@ class Rover:
         self._last_sent: int | None = None
         self._last_words = LastWords(self.boot)
         self._in_doubt = False
-        self._connect = connect if session is not None else check_endpoint(connect)
+        self._connect = connect
+        self._tls = tls
+        if session is None:
+            self._check_way()
+        self._wonders_s = float("inf")
         self._token = liveliness
         self._outbox: Outbox[tuple[Pose, Callable[[], Content]]] = Outbox()
         self._stop = threading.Event()
@@ -169,6 +184,17 @@ class Rover:
     def _leave(self) -> None:
         self.close(wait_s=0)
 
+    def _check_way(self) -> None:
+        check_transport(check_endpoint(self._connect), self._tls is not None)
+        if self._tls is not None:
+            warn_of_another_name(self.robot, self._tls)
+
+    def _wonder(self) -> None:
+        """Say once what it may be that nobody listens."""
+        if self._tls is not None and time.monotonic() > self._wonders_s:
+            self._wonders_s = float("inf")
+            logger.warning("%s", nobody_listens(self.robot, self._tls))
+
     def _check_open(self) -> None:
         if self._closing:
             raise LinkError(f"rover {self.robot} is closed")
@@ -182,10 +208,11 @@ class Rover:
     def _work(self) -> None:
         """The rover's own thread: connect, then encode and send until closed."""
         if self._link is None:
-            session = open_with_retry(self._connect, self._stop)
+            session = open_with_retry(self._connect, self._stop, self._tls)
             if session is None:
                 return
             self._attach(session, owned=True)
+            self._wonders_s = time.monotonic() + PATIENCE_S
         link = self._link
         while link is not None and not self._outbox.closed:
             if self._doubts(link) and link.keyframes_wanted():
@@ -197,6 +224,8 @@ class Rover:
             if taken is not None:
                 self._send_keyframe(link, *taken)
             elif held or self._outbox.waits or self._in_doubt:
+                if not link.keyframes_wanted():
+                    self._wonder()
                 self._stop.wait(_LOOK_EVERY_S)
 
     def _patience_s(self, held: bool) -> float | None:

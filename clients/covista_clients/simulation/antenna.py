@@ -11,6 +11,7 @@ from typing import Any
 import zenoh
 from covista_schemas import codec, keys
 from covista_schemas.messages import Pose, PoseUpdate
+from covista_schemas.zenoh_tls import Tls
 
 from covista_clients.simulation.accounts import Account
 from covista_clients.simulation.fleet import shared_session
@@ -88,10 +89,12 @@ class Antenna:
 
 
 @contextmanager
-def antenna(connect: str, site: str, names: Sequence[str], stop: threading.Event) -> Iterator[Antenna | None]:
+def antenna(
+    connect: str, site: str, names: Sequence[str], stop: threading.Event, tls: Tls | None = None
+) -> Iterator[Antenna | None]:
     """An antenna as soon as there is a router at `connect`; None once `stop` is set."""
     with ExitStack() as stack:
-        session = shared_session(connect, stop, stack)
+        session = shared_session(connect, stop, stack, tls)
         if session is None:
             yield None
             return

@@ -71,7 +71,7 @@ def run_crowd(
     if stock is None:
         return progress
     crowd = Crowd(stock, options.robots, options.seed)
-    with antenna(options.connect, options.site, crowd.names, stop) as raised:
+    with antenna(options.connect, options.site, crowd.names, stop, options.tls) as raised:
         if raised is not None and raised.await_heard(stop):
             plan = March(options.rate_hz, options.pose_rate_hz, seconds)
             march(crowd, raised, plan, RealTime(stop, GRAIN_S), options.now_ns(), progress)

@@ -12,6 +12,7 @@ from typing import Protocol
 
 import numpy as np
 from covista_schemas.messages import Camera, Pose
+from covista_schemas.zenoh_tls import Tls
 from numpy.typing import NDArray
 
 from covista_clients.simulation import worlds
@@ -44,6 +45,7 @@ class SwarmOptions:
     send: Sending = "image"
     width: int = 320
     height: int = 240
+    tls: Tls | None = None
     clock_offset_s: float = 0.0
 
     def __post_init__(self) -> None:
@@ -156,7 +158,8 @@ def run_swarm(
     """
     progress = progress or Progress()
     built = swarm(options)
-    with fleet(names(options), built.camera, options.connect, options.site, options.send, stop) as rovers:
+    way = (options.connect, options.site, options.send, stop, options.tls)
+    with fleet(names(options), built.camera, *way) as rovers:
         for record in drive(built, rovers, RealTime(stop), options.now_ns(), seconds, progress):
             if on_keyframe:
                 on_keyframe(record)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from covista_service.access.attempts import Attempts
 from covista_service.access.gate import Admitted, Gate, Refusal, Refused
 from covista_service.access.keyring import Door, Keyring
-from covista_service.access.listening import AccessError, check_listening, is_local, is_loopback
+from covista_service.access.listening import AccessError, check_listening, is_local, is_loopback, warn_of_open_doors
 from covista_service.access.scopes import Scope
 from covista_service.access.tokens import Token, TokenError, TokenSource
 from covista_service.access.watch import TokenWatch
@@ -27,4 +27,5 @@ __all__ = [
     "check_listening",
     "is_local",
     "is_loopback",
+    "warn_of_open_doors",
 ]

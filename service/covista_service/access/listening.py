@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Sequence
 from ipaddress import ip_address
 
 from covista_schemas.errors import CovistaError
+from covista_schemas.zenoh_config import has_own_tls
+
+from covista_service.telemetry import about
 
 _LOCAL_PROTOCOLS = ("unixsock-stream", "unixpipe")
+
+log = logging.getLogger(__name__)
 
 
 class AccessError(CovistaError):
@@ -19,22 +25,44 @@ def check_listening(
 ) -> None:
     """Refuse to listen beyond loopback without access control, unless `insecure`. Raises AccessError.
 
-    The API has it where there are tokens; `has_tokens` is asked only where that matters. The zenoh link has none yet.
+    The API has it where there are tokens; `has_tokens` is asked only where that matters. The zenoh link has it where it
+    is one of TLS.
     """
     if insecure:
+        warn_of_open_doors(endpoints)
         return
-    beyond = [endpoint for endpoint in endpoints if not is_local(endpoint)]
-    reasons = []
+    beyond, reasons = open_to_all(endpoints), []
     if not is_loopback(api_host) and not has_tokens():
         reasons.append(
             f"api = {api_host} would be open to the network, for there is no token yet (covista-station token add NAME)"
         )
     if beyond:
-        reasons.append(f"link = {', '.join(beyond)} would be open to the network, for zenoh has no access control yet")
+        reasons.append(
+            f"link = {', '.join(beyond)} would be open to the network, for it is plain (tls/ and zenoh_tls_* lock it)"
+        )
     if reasons:
         raise AccessError(
             f"{' and '.join(reasons)}; choose a loopback address, or set insecure (--insecure, COVISTA_INSECURE=true)"
         )
+
+
+def warn_of_open_doors(endpoints: Sequence[str]) -> None:
+    """Have the log say where everybody comes in."""
+    beyond = open_to_all(endpoints)
+    if beyond:
+        log.warning(
+            "the zenoh link is plain: everybody who reaches it can publish as any robot",
+            extra=about(link=", ".join(beyond)),
+        )
+
+
+def open_to_all(endpoints: Sequence[str]) -> list[str]:
+    """The end points, without their options, that others than this machine reach and that ask for no certificate."""
+    return [each.split("#")[0] for each in endpoints if not (is_local(each) or _is_locked(each))]
+
+
+def _is_locked(endpoint: str) -> bool:
+    return endpoint.startswith("tls/") and not has_own_tls(endpoint)
 
 
 def is_loopback(host: str) -> bool:

@@ -45,6 +45,8 @@ class Parts:
     archive: Archive
     flush: Callable[[float], bool]
     stream: Stream
+    # Looks at once at who is to be let in on zenoh.
+    renew: Callable[[], None] = lambda: None
     outgoing: Outgoing = field(default_factory=Outgoing)
     texts: Texts = field(default_factory=Texts)
     readers: Room = field(default_factory=lambda: Room(at_once=3, waiting=200))

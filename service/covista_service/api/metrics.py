@@ -95,6 +95,9 @@ def _link(vitals: Vitals) -> Iterator[Metric]:
     yield _gauge("covista_mail_robots", "Robots with mail that is not opened yet.", mail.robots)
     yield _gauge("covista_mail_messages", "Messages in mail that is not opened yet.", mail.messages)
     yield _gauge("covista_mail_bytes", "Payload in mail that is not opened yet.", mail.payload_bytes)
+    yield _counter(
+        "covista_link_refused", "Links on zenoh that may do nothing, by reason.", vitals.link_refused, "reason"
+    )
     yield _gauge("covista_link_sessions", "Sessions of zenoh with rovers, routers and others.", vitals.sessions)
 
 

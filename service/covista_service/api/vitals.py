@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from covista_service.loop import CrewStatus, SinkStatus
@@ -30,7 +30,7 @@ class Vitals:
     """The parts now.
 
     `turned_away` counts messages on no robot's account, by reason; `sinks` are by name; `sessions` are zenoh's that the
-    link has with rovers, routers and listeners.
+    link has with rovers, routers and listeners; `link_refused` counts who was not let in there, by reason.
     """
 
     mail: Mail
@@ -38,3 +38,4 @@ class Vitals:
     sinks: Mapping[str, SinkStatus]
     turned_away: Mapping[str, int]
     sessions: int
+    link_refused: Mapping[str, int] = field(default_factory=dict)

@@ -41,6 +41,9 @@ class Ingest:
         self._mailboxes = mailboxes
         self._clock = clock
         self._closed = False
+        # Robots and boots that have a token. Zenoh's threads and ours meet at the end.
+        self._tokens: set[tuple[str, str]] = set()
+        self._at_tokens = threading.Lock()
         self._subscribers: list[zenoh.Subscriber[Any]] = []
         self._threads: list[threading.Thread] = []
         self._listen(session, site, RobotTopic.KEYFRAME, _KEYFRAMES, _Opener("keyframe", mailboxes, clock))
@@ -48,9 +51,24 @@ class Ingest:
         alive = keys.every(site, RobotTopic.ALIVE)
         self._subscribers.append(session.liveliness().declare_subscriber(alive, self._token, history=True))
 
+    @property
+    def alive(self) -> frozenset[str]:
+        """The robots that have a token."""
+        with self._at_tokens:
+            return frozenset(robot for robot, _ in self._tokens)
+
+    def part(self) -> None:
+        """Hear no more, and know of no token any more: those that are still there show when we listen anew."""
+        self.close()
+        with self._at_tokens:
+            tokens, self._tokens = self._tokens, set()
+        for robot, boot in tokens:
+            self._mailboxes.token(robot, boot, False, self._clock())
+
     def close(self) -> None:
         """Hear no more."""
-        self._closed = True
+        with self._at_tokens:
+            self._closed = True
         for subscriber in self._subscribers:
             subscriber.undeclare()
         for thread in self._threads:
@@ -79,15 +97,19 @@ class Ingest:
             log.debug("a channel was closed")
 
     def _token(self, sample: zenoh.Sample) -> None:
-        if self._closed:
-            return
+        with self._at_tokens:
+            if not self._closed:
+                self._note(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
+
+    def _note(self, text: str, is_there: bool) -> None:
         try:
-            key = keys.parse_robot_key(str(sample.key_expr))
+            key = keys.parse_robot_key(text)
         except KeyExpressionError:
             self._mailboxes.turn_away(WRONG_KEY)
             return
         if key.boot is not None:
-            self._mailboxes.token(key.robot, key.boot, sample.kind == zenoh.SampleKind.PUT, self._clock())
+            (self._tokens.add if is_there else self._tokens.discard)((key.robot, key.boot))
+            self._mailboxes.token(key.robot, key.boot, is_there, self._clock())
 
 
 class _Opener:

@@ -14,9 +14,11 @@ from __future__ import annotations
 import logging
 import threading
 from collections import deque
+from collections.abc import Callable
 
 import zenoh
 from covista_schemas import keys
+from covista_schemas.errors import LinkError
 from covista_schemas.reports import EventReport
 from zenoh import ext
 
@@ -37,15 +39,18 @@ log = logging.getLogger(__name__)
 
 
 class Publisher:
-    """A sink of the loop's news."""
+    """A sink of the loop's news. Without a session it keeps what is to be told until it joins one."""
 
-    def __init__(self, session: zenoh.Session, site: str) -> None:
+    def __init__(self, session: zenoh.Session | None, site: str) -> None:
         self._session = session
         self._site = site
         self._changed = threading.Condition()
         self._events: deque[EventReport] = deque(maxlen=MAX_EVENTS)
         self._robots: dict[str, None] = {}
         self._snapshot: Snapshot | None = None
+        # The groups that were told last.
+        self._last: Snapshot | None = None
+        self._busy = self._parting = False
         self._closing = False
         self._told = 0
         self._lost = 0
@@ -61,7 +66,26 @@ class Publisher:
             if news.groups_changed:
                 self._snapshot = news.snapshot
                 self._robots.update(dict.fromkeys(news.robots))
-            self._changed.notify()
+            self._changed.notify_all()
+
+    def join(self, session: zenoh.Session) -> Callable[[], None]:
+        """Tell on this session, the groups that stand first; returns how to part with it."""
+        with self._changed:
+            self._session = session
+            if self._last is not None:
+                self._snapshot = self._snapshot or self._last
+                self._robots.update(dict.fromkeys(self._last.robots))
+            self._changed.notify_all()
+        return self.part
+
+    def part(self) -> None:
+        """Let go of the session, once what is being told is told."""
+        with self._changed:
+            self._parting = True
+            self._changed.wait_for(lambda: not self._busy)
+            self._session, self._parting = None, False
+            while self._publishers:
+                self._publishers.popitem()[1].undeclare()
 
     def status(self) -> SinkStatus:
         """How many events and groups of robots wait, were put, and were lost because they could not be."""
@@ -72,7 +96,7 @@ class Publisher:
         """Publish what is waiting, then end."""
         with self._changed:
             self._closing = True
-            self._changed.notify()
+            self._changed.notify_all()
         self._thread.join()
         while self._publishers:
             self._publishers.popitem()[1].undeclare()
@@ -85,26 +109,40 @@ class Publisher:
     def _run(self) -> None:
         while True:
             with self._changed:
-                self._changed.wait_for(lambda: self._closing or self._events or self._snapshot)
-                if not self._events and self._snapshot is None:
+                self._busy = False
+                self._changed.notify_all()
+                self._changed.wait_for(lambda: self._closing or self._may_tell)
+                if not self._may_tell:
+                    self._lost += len(self._events) + len(self._robots)
                     return
                 snapshot, robots, events = self._snapshot, tuple(self._robots), tuple(self._events)
                 self._snapshot = None
                 self._robots.clear()
                 self._events.clear()
-            try:
-                self._publish(snapshot, robots, events)
-            except Exception:
-                # What cannot be published today must not keep tomorrow's groups from going out.
-                log.exception("cannot publish", extra=about(events=len(events), robots=len(robots)))
-                with self._changed:
-                    self._lost += len(events) + len(robots)
-            else:
-                with self._changed:
-                    self._told += len(events) + len(robots)
+                self._busy = True
+            self._tell(snapshot, robots, events)
+
+    @property
+    def _may_tell(self) -> bool:
+        """Whether something waits, and there is a session for it."""
+        waits = bool(self._events) or self._snapshot is not None
+        return waits and self._session is not None and not self._parting
+
+    def _tell(self, snapshot: Snapshot | None, robots: tuple[str, ...], events: tuple[EventReport, ...]) -> None:
+        try:
+            self._publish(snapshot, robots, events)
+        except Exception:
+            # What cannot be published today must not keep tomorrow's groups from going out.
+            log.exception("cannot publish", extra=about(events=len(events), robots=len(robots)))
+            with self._changed:
+                self._lost += len(events) + len(robots)
+        else:
+            with self._changed:
+                self._told += len(events) + len(robots)
 
     def _publish(self, snapshot: Snapshot | None, robots: tuple[str, ...], events: tuple[EventReport, ...]) -> None:
         if snapshot is not None:
+            self._last = snapshot
             self._put(keys.groups(self._site), answers.groups_report(snapshot).model_dump_json())
             for robot in robots:
                 self._put(
@@ -129,6 +167,8 @@ class Publisher:
         heartbeat = ext.MissDetectionConfig(
             heartbeat=HEARTBEAT_S if whole else OWN_HEARTBEAT_S, sporadic_heartbeat=None
         )
+        if self._session is None:
+            raise LinkError(f"no session to publish {key} on")
         return ext.declare_advanced_publisher(
             self._session,
             key,

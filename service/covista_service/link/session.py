@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import zenoh
 from covista_schemas.errors import LinkError
 from covista_schemas.zenoh_config import config
+from covista_schemas.zenoh_tls import Tls
 
 # Bursts may wait so long for a link that is busy. One on which a message was dropped is not waited for again until it
 # moves.
@@ -18,9 +21,20 @@ _DROP = "transport/link/tx/queue/congestion_control/drop"
 _PLACE = re.compile(r" at /\S+|[\[\]]")
 
 
-def open_session(listen: Sequence[str], connect: Sequence[str]) -> zenoh.Session:
-    """Listen and join. Raises LinkError, whose text names the end points and the flag to change them."""
-    made = config("router", listen=listen, connect=connect)
+def open_session(
+    listen: Sequence[str],
+    connect: Sequence[str],
+    tls: Tls | None = None,
+    access: Mapping[str, Any] | None = None,
+) -> zenoh.Session:
+    """Listen and join; `access` is who may do what (see `rules`), None for everybody everything.
+
+    A router that is not there yet is looked for until it is. Raises LinkError, whose text names the end points and the
+    flag to change them.
+    """
+    made = config("router", listen=listen, connect=connect, tls=tls)
+    if access is not None:
+        made.insert_json5("access_control", json.dumps(access))
     made.insert_json5(f"{_DROP}/wait_before_drop", str(WAIT_US))
     made.insert_json5(f"{_DROP}/max_wait_before_drop_fragments", str(2 * WAIT_US))
     try:

@@ -41,7 +41,21 @@ def test_a_token_opens_the_api_to_the_network_and_not_the_link() -> None:
     with pytest.raises(AccessError) as caught:
         check_listening("0.0.0.0", ["tcp/0.0.0.0:1"], insecure=False, has_tokens=lambda: True)
     assert "api" not in str(caught.value)
-    assert "zenoh has no access control" in str(caught.value)
+    assert "it is plain" in str(caught.value)
+
+
+def test_an_end_point_of_tls_may_be_open_to_the_network_but_not_one_that_knows_no_list() -> None:
+    check_listening("127.0.0.1", ["tls/0.0.0.0:1"], insecure=False)
+    with pytest.raises(AccessError, match=r"link = tls/0\.0\.0\.0:1 would be open"):
+        check_listening("127.0.0.1", ["tls/0.0.0.0:1#listen_certificate=mine.pem"], insecure=False)
+
+
+def test_a_plain_link_that_others_reach_is_told_of(caplog: pytest.LogCaptureFixture) -> None:
+    check_listening("127.0.0.1", ["tcp/127.0.0.1:1", "tls/0.0.0.0:1"], insecure=True)
+    assert not caplog.records
+    check_listening("127.0.0.1", ["tcp/0.0.0.0:1"], insecure=True)
+    (record,) = caplog.records
+    assert "everybody who reaches it can publish as any robot" in record.message
 
 
 def test_whether_there_are_tokens_is_asked_only_where_it_matters() -> None:

@@ -52,6 +52,7 @@ class Desk:
             ),
             sinks={"zenoh": SinkStatus(7, 8, 9), "history": SinkStatus(10, 11, 12)},
             turned_away={"wrong_key": 2},
+            link_refused={"unlisted": 3},
             sessions=13,
         )
     )
