@@ -46,6 +46,12 @@ def swarm(
     seconds: Annotated[
         float | None, typer.Option(min=0, help="End after so many seconds; a crowd counts from when it is heard.")
     ] = None,
+    only: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ROBOT", help="Drive this one of the rovers alone; the others have processes of their own."
+        ),
+    ] = None,
     clock_offset: Annotated[float, typer.Option(help="Seconds that the rovers' clocks are ahead.")] = 0.0,
     accounts: Annotated[
         float | None,
@@ -79,6 +85,7 @@ def swarm(
             site=site,
             send=send.value,
             clock_offset_s=clock_offset,
+            only=only,
         )
         options = replace(options, tls=tls)
         default_hz = CROWD_POSE_RATE_HZ if is_crowd(options) else options.pose_rate_hz
@@ -127,7 +134,8 @@ def _run(options: SwarmOptions, seconds: float | None, accounts: float | None) -
     with ThreadPoolExecutor(1, "swarm") as pool:
         running = pool.submit(run, options, stop, seconds=seconds, accountant=accountant)
         with ends_by_interrupt():
-            where = f"{options.robots} rovers in {options.world} send to {options.connect}"
+            who = options.only or f"{options.robots} rovers"
+            where = f"{who} in {options.world} {'sends' if options.only else 'send'} to {options.connect}"
             print(f"{where}; Ctrl-C ends.", file=sys.stderr)
             wait([running])
         stop.set()

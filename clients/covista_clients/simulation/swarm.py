@@ -32,7 +32,8 @@ MOST_CLOCK_OFFSET_S = 1e9
 class SwarmOptions:
     """A swarm: how many rovers, where, how often they send, and to whom. Raises ValueError for what makes no sense.
 
-    `clock_offset_s` is how far the rovers' clocks are ahead.
+    `clock_offset_s` is how far the rovers' clocks are ahead. With `only` this process drives that rover alone: the
+    others of the same swarm have processes of their own.
     """
 
     robots: int = 6
@@ -47,6 +48,7 @@ class SwarmOptions:
     height: int = 240
     tls: Tls | None = None
     clock_offset_s: float = 0.0
+    only: str | None = None
 
     def __post_init__(self) -> None:
         if self.robots < 1:
@@ -55,6 +57,8 @@ class SwarmOptions:
             raise ValueError(f"there is no world {self.world!r}, but {', '.join(worlds.WORLDS)}")
         if not (0 < self.rate_hz < math.inf and 0 <= self.pose_rate_hz < math.inf):
             raise ValueError("rate_hz must be positive, and pose_rate_hz not negative, and both finite")
+        if self.only is not None and self.only not in names(self):
+            raise ValueError(f"only: there is no rover {self.only!r} among r1 to r{self.robots}")
         if not abs(self.clock_offset_s) <= MOST_CLOCK_OFFSET_S:
             raise ValueError(f"clock_offset_s = {self.clock_offset_s:g} is not within {MOST_CLOCK_OFFSET_S:g} s")
 
@@ -131,6 +135,11 @@ def names(options: SwarmOptions) -> list[str]:
     return [f"r{k + 1}" for k in range(options.robots)]
 
 
+def driven(options: SwarmOptions) -> list[int]:
+    """Indices of the robots that this process drives."""
+    return [k for k, name in enumerate(names(options)) if options.only in (None, name)]
+
+
 def camera(options: SwarmOptions) -> Camera:
     """The camera that all rovers have."""
     return pinhole(options.width, options.height)
@@ -159,7 +168,7 @@ def run_swarm(
     progress = progress or Progress()
     built = swarm(options)
     way = (options.connect, options.site, options.send, stop, options.tls)
-    with fleet(names(options), built.camera, *way) as rovers:
+    with fleet([names(options)[each] for each in driven(options)], built.camera, *way) as rovers:
         for record in drive(built, rovers, RealTime(stop), options.now_ns(), seconds, progress):
             if on_keyframe:
                 on_keyframe(record)
@@ -182,25 +191,33 @@ def drive(
 ) -> Iterator[KeyframeRecord]:
     """Send what is due, in order, and yield the keyframes; one that is more than a period late is skipped.
 
+    There is a sender for each robot that is driven.
+
     Poses and pictures are those of the time at which they are due, whenever they go out; `begin_ns` is sensor time 0.
     """
     progress = progress or Progress()
     options = built.options
     newest: dict[str, int] = {}
+    if not senders:
+        return
+    sender_of = dict(zip(driven(options), senders, strict=True))
     due_all = schedule(options.robots, options.rate_hz, options.pose_rate_hz)
     for due in itertools.takewhile(lambda due: seconds is None or due.t_s < seconds, due_all):
+        sender = sender_of.get(due.robot)
+        if sender is None:
+            continue
         if not pace.wait_until(due.t_s):
             return
         progress.behind_s = max(0.0, pace.now_s() - due.t_s)
         progress.most_behind_s = max(progress.most_behind_s, progress.behind_s)
         pose = built.paths.pose(due.robot, due.t_s, begin_ns + round(due.t_s * 1e9))
         if not due.is_keyframe:
-            senders[due.robot].send_pose(pose)
+            sender.send_pose(pose)
             progress.poses += 1
         elif progress.behind_s > 1 / options.rate_hz:
             progress.skipped += 1
         else:
-            record = _keyframe(built, senders[due.robot], due, pose)
+            record = _keyframe(built, sender, due, pose)
             is_new = record.sequence > newest.get(record.robot, -1)
             newest[record.robot] = record.sequence
             progress.keyframes += is_new

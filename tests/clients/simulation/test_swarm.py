@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -75,6 +75,16 @@ def test_the_same_options_send_the_same_pictures(built: Swarm) -> None:
         np.testing.assert_array_equal(image, same_image)
 
 
+def test_a_rover_alone_sends_what_it_sends_among_others(built: Swarm) -> None:
+    together, _, _ = driven(built, 2.0)
+    alone, progress = Recorder(), Progress()
+    records = list(drive(swarm(replace(OPTIONS, only="r2")), [alone], AtOnce(), 10**18, 2.0, progress))
+    assert {record.robot for record in records} == {"r2"}
+    assert alone.poses == together[1].poses
+    assert [pose for _, pose in alone.keyframes] == [pose for _, pose in together[1].keyframes]
+    assert (progress.keyframes, progress.poses) == (4, 10)
+
+
 def test_a_swarm_that_falls_behind_skips_and_says_so(built: Swarm) -> None:
     progress = Progress()
     list(drive(built, [Recorder() for _ in range(3)], Late(), 0, 4.0, progress))
@@ -97,7 +107,12 @@ def test_the_schedule_is_in_order() -> None:
 
 @pytest.mark.parametrize(
     ("wrong", "reason"),
-    [({"robots": 0}, "at least 1"), ({"world": "moon"}, "arena"), ({"rate_hz": 0.0}, "rate_hz")],
+    [
+        ({"robots": 0}, "at least 1"),
+        ({"only": "r7"}, "no rover 'r7' among r1 to r6"),
+        ({"world": "moon"}, "arena"),
+        ({"rate_hz": 0.0}, "rate_hz"),
+    ],
 )
 def test_options_that_make_no_sense_say_why(wrong: dict, reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
