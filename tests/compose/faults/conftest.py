@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from contextlib import suppress
+from typing import Any
 
 import pytest
 
@@ -10,6 +12,7 @@ from tests.compose.faults.record import Record
 from tests.compose.stack import engine_answers
 
 RUNS = int(os.environ.get("COVISTA_FAULT_RUNS", "1"))
+SETTLED_S = 5.0
 kept = pytest.StashKey[Record]()
 
 
@@ -18,7 +21,8 @@ class Deployments:
 
     def __init__(self) -> None:
         self._present: Field | None = None
-        self._built = False
+        # Whoever has built the images already need not wait for it again.
+        self._built = os.environ.get("COVISTA_FAULT_BUILT") == "1"
 
     def of(self, *, behind: bool) -> Field:
         if self._present is None or self._present.behind != behind:
@@ -54,27 +58,47 @@ class Books:
         """The station has begun its accounts anew."""
         self._anew = True
 
-    def close(self, beside: list[dict[str, object]] | None = None) -> dict[str, int]:
+    def close(self, beside: list[dict[str, Any]] | None = None) -> dict[str, int]:
         """Have the rovers end, and compare; gives how many keyframes are missing of each."""
         self._field.stop(*ROVERS)
-        reports = self._field.robots()
-        missing = {}
+        sent = {robot: self._sent(robot, beside or []) for robot in ROVERS}
+        # What came last may still wait for its turn.
+        with suppress(TimeoutError):
+            self._field.until(lambda: self._settled(sent), SETTLED_S, "all that was sent is on the books")
+        reports, missing = self._field.robots(), {}
         for robot in ROVERS:
-            report = reports[robot]
+            report, before = reports[robot], self._before_of(robot)
             check_sums(report)
-            before = None if self._anew else self._before.get(robot)
-            fresh = [each for each in self._accounts(robot) if each["boot"] not in self._boots]
-            fresh += [each for each in beside or () if each["robot"] == robot]
             for topic in TOPICS:
-                counted = heard(report, topic) - (heard(before, topic) if before else 0)
-                sent = sum(int(each[topic]) for each in fresh)
+                counted = self._counted(report, topic)
                 # Up to ten poses and two keyframes a second since the last account, and a late second.
                 slack = self._killed.get(robot, 0) * (30 if topic == "poses" else 6)
-                assert sent <= counted <= sent + slack, (robot, topic, sent, counted, report[topic], before)
+                least = sent[robot][topic]
+                assert least <= counted <= least + slack, (robot, topic, least, counted, report[topic], before)
             missing[robot] = report["keyframes"]["missing"] - (before["keyframes"]["missing"] if before else 0)
         return missing
 
-    def _accounts(self, robot: str) -> list[dict[str, object]]:
+    def _sent(self, robot: str, beside: list[dict[str, Any]]) -> dict[str, int]:
+        fresh = [each for each in self._accounts(robot) if each["boot"] not in self._boots]
+        fresh += [each for each in beside if each["robot"] == robot]
+        return {topic: sum(each[topic] for each in fresh) for topic in TOPICS}
+
+    def _before_of(self, robot: str) -> dict[str, Any] | None:
+        return None if self._anew else self._before.get(robot)
+
+    def _counted(self, report: dict[str, Any], topic: str) -> int:
+        before = self._before_of(report["id"])
+        return heard(report, topic) - (heard(before, topic) if before else 0)
+
+    def _settled(self, sent: dict[str, dict[str, int]]) -> bool:
+        known = self._field.robots()
+        return all(
+            self._counted(known[robot], topic) >= sent[robot][topic] and known[robot][topic]["waiting"] == 0
+            for robot in ROVERS
+            for topic in TOPICS
+        )
+
+    def _accounts(self, robot: str) -> list[dict[str, Any]]:
         return last_accounts(said_by(self._field.container(robot)))
 
 
