@@ -4,7 +4,9 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 # Docker's own subcommand on some machines, a program on others.
 COMPOSE ?= $(shell docker compose version >/dev/null 2>&1 && echo docker compose || echo docker-compose)
-STACK := $(COMPOSE) --project-name covista --file docker/compose.yaml
+# By the environment, not by a flag: the compose file names a network by it.
+export COMPOSE_PROJECT_NAME ?= covista
+STACK := $(COMPOSE) --file docker/compose.yaml
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
@@ -43,7 +45,7 @@ up: ## Station and rovers as containers, in the background
 	@BASE_IMAGE=$$(docker/base.sh) && export BASE_IMAGE && $(STACK) build --quiet && $(STACK) up --detach || \
 		{ echo "Where a port is taken, say another: COVISTA_API_AT=127.0.0.1:8001 COVISTA_LINK_AT=127.0.0.1:7448 make up"; exit 1; }
 	@echo "The station answers at http://$$($(STACK) port station 8000)/api/v1/groups; rovers reach it at tcp/$$($(STACK) port station 7447)."
-	@echo "make down ends all; the history stays in the volume covista_history."
+	@echo "make down ends all; the history stays in the volume $(COMPOSE_PROJECT_NAME)_history."
 
 down: ## End what make up started
 	@$(call need_engine)

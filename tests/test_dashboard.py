@@ -136,13 +136,13 @@ def services() -> dict[str, Any]:
 
 
 def test_metrics_are_a_profile_so_that_station_and_rovers_need_no_more_images(services: dict[str, Any]) -> None:
-    assert {name for name, service in services.items() if "profiles" not in service} == {"station", "rovers"}
-    assert all(services[name]["profiles"] == ["metrics"] for name in ("prometheus", "grafana"))
+    assert {name for name, service in services.items() if "profiles" not in service} == {"station", "r1", "r2", "r3"}
+    assert all(services[name]["profiles"] == ["observability"] for name in ("prometheus", "grafana"))
 
 
 def test_every_port_is_published_on_loopback_unless_told_otherwise(services: dict[str, Any]) -> None:
     ports = [port for service in services.values() for port in service.get("ports", [])]
-    assert len(ports) == 4
+    assert len(ports) == 5
     assert all(re.fullmatch(r"\$\{COVISTA_\w+_AT:-127\.0\.0\.1:\d+\}:\d+", port) for port in ports)
 
 

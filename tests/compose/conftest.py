@@ -5,7 +5,7 @@ import pytest
 
 from tests.compose.stack import Stack, engine_answers, of_this_tree
 
-ROBOTS = 6
+ROBOTS = 3
 running = pytest.StashKey[Stack]()
 
 
@@ -14,7 +14,7 @@ def stack(request: pytest.FixtureRequest) -> Iterator[Stack]:
     """A station and its rovers, started; taken down with their volume whatever happens."""
     if not engine_answers():
         pytest.skip("no Docker engine answers here")
-    deployed = of_this_tree(ROBOTS)
+    deployed = of_this_tree()
     request.config.stash[running] = deployed
     try:
         deployed.run("build", within_s=1200)

@@ -50,12 +50,14 @@ class Stack:
         self.run("down", "--volumes", "--remove-orphans", "--timeout=10")
 
 
-def of_this_tree(robots: int) -> Stack:
+def of_this_tree() -> Stack:
     """The deployment that the tests start: not yet built, not yet running."""
     project = f"covista-test-{os.getpid()}"
     environment = {
         "BASE_IMAGE": said([str(ROOT / "docker" / "base.sh")], within_s=600).strip(),
-        "COVISTA_ROBOTS": str(robots),
+        # Compose of all versions names the operators' network by it.
+        "COMPOSE_PROJECT_NAME": project,
+        "COVISTA_TAG": f"test-{os.getpid()}",
         "COVISTA_API_AT": "127.0.0.1:0",
         "COVISTA_LINK_AT": "127.0.0.1:0",
     }

@@ -46,7 +46,7 @@ def test_an_overlay_shows_a_picture(stack: Stack) -> None:
 
 def test_nobody_runs_as_root(stack: Stack) -> None:
     assert stack.run("exec", "-T", "station", "id", "-un").strip() == "covista"
-    assert stack.run("exec", "-T", "rovers", "id", "-un").strip() == "covista"
+    assert stack.run("exec", "-T", "r1", "id", "-un").strip() == "covista"
 
 
 def test_the_history_is_written_to_the_volume(stack: Stack) -> None:
@@ -56,7 +56,7 @@ def test_the_history_is_written_to_the_volume(stack: Stack) -> None:
 
 def test_both_end_cleanly_when_asked(stack: Stack) -> None:
     stack.run("stop", "--timeout=10")
-    for service in ("rovers", "station"):
+    for service in ("r1", "r2", "r3", "station"):
         state = ["docker", "inspect", "--format", "{{.State.ExitCode}}", stack.container(service)]
         code = subprocess.run(state, check=True, capture_output=True, text=True).stdout.strip()
         assert (service, code) == (service, "0")

@@ -31,6 +31,10 @@ WorldName = Annotated[str, typer.Option("--world", help="corner, boxes, shelf, w
 
 def swarm(
     robots: Annotated[int, typer.Option(min=1, help="How many rovers.")] = 6,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(metavar="ID", help="Drive this rover alone; repeatable. Other processes drive the rest."),
+    ] = None,
     world: WorldName = "arena",
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same swarm.")] = 0,
     rate: Annotated[float, typer.Option(help="Keyframes per second and rover.")] = 2.0,
@@ -45,12 +49,6 @@ def swarm(
     ] = None,
     seconds: Annotated[
         float | None, typer.Option(min=0, help="End after so many seconds; a crowd counts from when it is heard.")
-    ] = None,
-    only: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ROBOT", help="Drive this one of the rovers alone; the others have processes of their own."
-        ),
     ] = None,
     clock_offset: Annotated[float, typer.Option(help="Seconds that the rovers' clocks are ahead.")] = 0.0,
     accounts: Annotated[
@@ -68,6 +66,8 @@ def swarm(
     More than 6 that send features are a crowd: their keyframes are made before they start, 12 for each of 24 robots,
     and up to a thousand robots send them from one process. Each 24 (6 outside of the arena) have a world of their own.
 
+    With --only, processes that are told the same of a swarm drive it together: where it is they know by the clock.
+
     In the names of --tls-cert and --tls-key {robot} stands for each robot's id; a crowd shares one certificate.
     """
     tls = certificates(connect, tls_ca, tls_cert, tls_key)
@@ -84,10 +84,10 @@ def swarm(
             connect=connect,
             site=site,
             send=send.value,
+            tls=tls,
             clock_offset_s=clock_offset,
-            only=only,
+            only=tuple(only or ()),
         )
-        options = replace(options, tls=tls)
         default_hz = CROWD_POSE_RATE_HZ if is_crowd(options) else options.pose_rate_hz
         options = replace(options, pose_rate_hz=default_hz if pose_rate is None else pose_rate)
     progress = _run(options, seconds, accounts)
@@ -134,8 +134,8 @@ def _run(options: SwarmOptions, seconds: float | None, accounts: float | None) -
     with ThreadPoolExecutor(1, "swarm") as pool:
         running = pool.submit(run, options, stop, seconds=seconds, accountant=accountant)
         with ends_by_interrupt():
-            who = options.only or f"{options.robots} rovers"
-            where = f"{who} in {options.world} {'sends' if options.only else 'send'} to {options.connect}"
+            who = f"{', '.join(options.only)} of {options.robots}" if options.only else options.robots
+            where = f"{who} rovers in {options.world} send to {options.connect}"
             print(f"{where}; Ctrl-C ends.", file=sys.stderr)
             wait([running])
         stop.set()

@@ -39,7 +39,7 @@ class March:
 
 def is_crowd(options: SwarmOptions) -> bool:
     """Whether so many robots send features that pictures cannot be rendered while they drive."""
-    return options.send != "image" and options.robots > ROVERS_PER_COURT and options.only is None
+    return options.send != "image" and not options.only and options.robots > ROVERS_PER_COURT
 
 
 def stock_of(options: SwarmOptions) -> StockOptions:

@@ -19,21 +19,24 @@ from covista_clients.simulation import worlds
 from covista_clients.simulation.accounts import Accountant, account
 from covista_clients.simulation.fleet import Sending, fleet
 from covista_clients.simulation.pacing import Due, Pace, RealTime, schedule
-from covista_clients.simulation.paths import Paths
+from covista_clients.simulation.paths import SCENE_S, Paths
 from covista_clients.simulation.renderer import render
 from covista_clients.simulation.viewing import pinhole
 from covista_clients.simulation.world import World
 
 # Some thirty years: what is further off is no clock.
 MOST_CLOCK_OFFSET_S = 1e9
+# Processes that each drive some rovers of one swarm agree on how far it has come by the machine's clock: the swarm
+# begins anew every hour, with a whole number of scenes.
+ROUND_S = 200 * SCENE_S
 
 
 @dataclass(frozen=True, slots=True)
 class SwarmOptions:
     """A swarm: how many rovers, where, how often they send, and to whom. Raises ValueError for what makes no sense.
 
-    `clock_offset_s` is how far the rovers' clocks are ahead. With `only` this process drives that rover alone: the
-    others of the same swarm have processes of their own.
+    `clock_offset_s` is how far the rovers' clocks are ahead. `only` names those that this process drives, where others
+    drive the rest of the same swarm; empty: all.
     """
 
     robots: int = 6
@@ -48,7 +51,7 @@ class SwarmOptions:
     height: int = 240
     tls: Tls | None = None
     clock_offset_s: float = 0.0
-    only: str | None = None
+    only: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.robots < 1:
@@ -57,10 +60,11 @@ class SwarmOptions:
             raise ValueError(f"there is no world {self.world!r}, but {', '.join(worlds.WORLDS)}")
         if not (0 < self.rate_hz < math.inf and 0 <= self.pose_rate_hz < math.inf):
             raise ValueError("rate_hz must be positive, and pose_rate_hz not negative, and both finite")
-        if self.only is not None and self.only not in names(self):
-            raise ValueError(f"only: there is no rover {self.only!r} among r1 to r{self.robots}")
         if not abs(self.clock_offset_s) <= MOST_CLOCK_OFFSET_S:
             raise ValueError(f"clock_offset_s = {self.clock_offset_s:g} is not within {MOST_CLOCK_OFFSET_S:g} s")
+
+        if unknown := sorted(set(self.only) - {f"r{k + 1}" for k in range(self.robots)}):
+            raise ValueError(f"a swarm of {self.robots} has no robot {', '.join(unknown)}, but r1 to r{self.robots}")
 
     def now_ns(self) -> int:
         """The time by the rovers' clocks."""
@@ -131,13 +135,18 @@ class Swarm:
 
 
 def names(options: SwarmOptions) -> list[str]:
-    """The robots' ids, r1 to rN."""
-    return [f"r{k + 1}" for k in range(options.robots)]
+    """Ids of the robots that this process drives, of r1 to rN."""
+    return [f"r{k + 1}" for k in members(options)]
 
 
-def driven(options: SwarmOptions) -> list[int]:
-    """Indices of the robots that this process drives."""
-    return [k for k, name in enumerate(names(options)) if options.only in (None, name)]
+def members(options: SwarmOptions) -> list[int]:
+    """Indices in the swarm of the robots that this process drives."""
+    return [k for k in range(options.robots) if not options.only or f"r{k + 1}" in options.only]
+
+
+def come_so_far_s(options: SwarmOptions) -> float:
+    """Where on its paths the swarm is now: at the beginning, or where those of its rovers are that others drive."""
+    return time.time() % ROUND_S if options.only else 0.0
 
 
 def camera(options: SwarmOptions) -> Camera:
@@ -168,8 +177,9 @@ def run_swarm(
     progress = progress or Progress()
     built = swarm(options)
     way = (options.connect, options.site, options.send, stop, options.tls)
-    with fleet([names(options)[each] for each in driven(options)], built.camera, *way) as rovers:
-        for record in drive(built, rovers, RealTime(stop), options.now_ns(), seconds, progress):
+    with fleet(names(options), built.camera, *way) as rovers:
+        pace, driven_s = RealTime(stop), come_so_far_s(options)
+        for record in drive(built, rovers, pace, options.now_ns(), seconds, progress, driven_s):
             if on_keyframe:
                 on_keyframe(record)
             if accountant:
@@ -188,36 +198,36 @@ def drive(
     begin_ns: int,
     seconds: float | None = None,
     progress: Progress | None = None,
+    driven_s: float = 0.0,
 ) -> Iterator[KeyframeRecord]:
     """Send what is due, in order, and yield the keyframes; one that is more than a period late is skipped.
 
-    There is a sender for each robot that is driven.
-
-    Poses and pictures are those of the time at which they are due, whenever they go out; `begin_ns` is sensor time 0.
+    `senders` are those of `names`. Poses and pictures are those of the time at which they are due, whenever they go
+    out; `begin_ns` is sensor time 0, at which the swarm has driven for `driven_s` already.
     """
     progress = progress or Progress()
     options = built.options
-    newest: dict[str, int] = {}
     if not senders:
+        # Nothing would ever be due.
         return
-    sender_of = dict(zip(driven(options), senders, strict=True))
-    due_all = schedule(options.robots, options.rate_hz, options.pose_rate_hz)
+    sender_of = dict(zip(members(options), senders, strict=False))
+    newest: dict[str, int] = {}
+    schedule_all = schedule(options.robots, options.rate_hz, options.pose_rate_hz)
+    due_all = (due for due in schedule_all if due.robot in sender_of)
     for due in itertools.takewhile(lambda due: seconds is None or due.t_s < seconds, due_all):
-        sender = sender_of.get(due.robot)
-        if sender is None:
-            continue
         if not pace.wait_until(due.t_s):
             return
         progress.behind_s = max(0.0, pace.now_s() - due.t_s)
         progress.most_behind_s = max(progress.most_behind_s, progress.behind_s)
-        pose = built.paths.pose(due.robot, due.t_s, begin_ns + round(due.t_s * 1e9))
+        place_s = (driven_s + due.t_s) % ROUND_S if options.only else due.t_s
+        pose = built.paths.pose(due.robot, place_s, begin_ns + round(due.t_s * 1e9))
         if not due.is_keyframe:
-            sender.send_pose(pose)
+            sender_of[due.robot].send_pose(pose)
             progress.poses += 1
         elif progress.behind_s > 1 / options.rate_hz:
             progress.skipped += 1
         else:
-            record = _keyframe(built, sender, due, pose)
+            record = _keyframe(built, sender_of[due.robot], due, pose)
             is_new = record.sequence > newest.get(record.robot, -1)
             newest[record.robot] = record.sequence
             progress.keyframes += is_new

@@ -20,6 +20,15 @@ def test_a_swarm_sends_and_leaves(run: Run, endpoint: str, ground: Ground) -> No
     ground.wait(lambda: not ground.tokens)
 
 
+def test_one_rover_of_a_swarm_drives_alone(run: Run, endpoint: str, ground: Ground) -> None:
+    arguments = ("--robots", "3", "--only", "r2", "--world", "wall", "--rate", "5", "--seconds", "0.5")
+    code, _, err = run("swarm", *arguments, "--connect", endpoint)
+    assert code == 0
+    assert {keyframe.robot for keyframe in ground.keyframes} == {"r2"}
+    assert err.splitlines()[0].startswith("r2 of 3 rovers in wall send to")
+    ground.wait(lambda: not ground.tokens)
+
+
 def test_a_swarm_leaves_when_it_is_interrupted(endpoint: str, ground: Ground) -> None:
     options = ["--robots", "1", "--world", "wall", "--connect", endpoint, "--send", "features"]
     command = [sys.executable, "-m", "covista_clients", "swarm", *options]
@@ -72,6 +81,7 @@ def test_a_swarm_goes_by_the_clock_that_it_is_given(run: Run, endpoint: str, gro
     [
         (("swarm", "--clock-offset", "nan"), "clock_offset_s = nan is not within 1e+09 s"),
         (("swarm", "--world", "moon"), "there is no world 'moon'"),
+        (("swarm", "--robots", "3", "--only", "r4"), "a swarm of 3 has no robot r4, but r1 to r3"),
         (("swarm", "--rate", "0"), "rate_hz must be positive"),
         (("swarm", "--rate", "inf"), "rate_hz must be positive"),
         (("swarm", "--pose-rate", "-1"), "pose_rate_hz not negative"),

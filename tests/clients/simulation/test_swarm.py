@@ -78,7 +78,7 @@ def test_the_same_options_send_the_same_pictures(built: Swarm) -> None:
 def test_a_rover_alone_sends_what_it_sends_among_others(built: Swarm) -> None:
     together, _, _ = driven(built, 2.0)
     alone, progress = Recorder(), Progress()
-    records = list(drive(swarm(replace(OPTIONS, only="r2")), [alone], AtOnce(), 10**18, 2.0, progress))
+    records = list(drive(swarm(replace(OPTIONS, only=("r2",))), [alone], AtOnce(), 10**18, 2.0, progress))
     assert {record.robot for record in records} == {"r2"}
     assert alone.poses == together[1].poses
     assert [pose for _, pose in alone.keyframes] == [pose for _, pose in together[1].keyframes]
@@ -109,7 +109,7 @@ def test_the_schedule_is_in_order() -> None:
     ("wrong", "reason"),
     [
         ({"robots": 0}, "at least 1"),
-        ({"only": "r7"}, "no rover 'r7' among r1 to r6"),
+        ({"only": ("r7",)}, "has no robot r7"),
         ({"world": "moon"}, "arena"),
         ({"rate_hz": 0.0}, "rate_hz"),
     ],
