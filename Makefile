@@ -12,7 +12,7 @@ STACK := $(COMPOSE) --file docker/compose.yaml
 TESTS := $(BIN)/pytest --numprocesses=auto --maxprocesses=4 --dist=loadfile
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help demo test check api-test fuzz soak bench up down compose-test
+.PHONY: help demo test check api-test fuzz soak bench up down compose-test fault-test
 
 help: ## Say what there is to make
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1: \2/p' Makefile
@@ -69,7 +69,11 @@ down: ## End what make up started
 
 compose-test: .venv/.dev ## Station and rovers as containers, seen from outside
 	@echo "compose-test: building, starting and asking station and rovers in containers"
-	@$(BIN)/pytest tests/compose -m compose
+	@$(BIN)/pytest tests/compose -m compose --ignore=tests/compose/faults
+
+fault-test: .venv/.dev ## Containers broken as the field breaks them; not all of it holds yet (docs/reliability.md)
+	@echo "fault-test: breaking rovers, networks, senders, station and stores in containers"
+	@$(BIN)/pytest tests/compose/faults -m compose
 
 # The stamps: what is installed was installed for this pyproject.toml.
 .venv/.demo: pyproject.toml | .venv/bin/python

@@ -89,12 +89,12 @@ def said(command: list[str], within_s: float, environment: Mapping[str, str] | N
     return done.stdout
 
 
-def wait_for(ask: Callable[[], Answer | None], within_s: float, what: str) -> Answer:
-    """The first answer that is not None, asked twice a second."""
+def wait_for(ask: Callable[[], Answer | None], within_s: float, what: str, every_s: float = 0.5) -> Answer:
+    """The first answer that is not None, asked again and again."""
     ends = time.monotonic() + within_s
     between = threading.Event()
     while time.monotonic() < ends:
         if (answer := ask()) is not None:
             return answer
-        between.wait(0.5)
+        between.wait(every_s)
     raise TimeoutError(f"not within {within_s} s: {what}")

@@ -86,6 +86,16 @@ def test_the_same_options_send_the_same_pictures(built: Swarm) -> None:
         np.testing.assert_array_equal(image, same_image)
 
 
+def test_a_rover_alone_sends_what_it_sends_among_others(built: Swarm) -> None:
+    together, _, _ = driven(built, 2.0)
+    alone, progress = Recorder(), Progress()
+    records = list(drive(swarm(replace(OPTIONS, only=("r2",))), [alone], AtOnce(), 10**18, 2.0, progress))
+    assert {record.robot for record in records} == {"r2"}
+    assert alone.poses == together[1].poses
+    assert [pose for _, pose in alone.keyframes] == [pose for _, pose in together[1].keyframes]
+    assert (progress.keyframes, progress.poses) == (4, 10)
+
+
 def test_a_swarm_that_falls_behind_skips_and_says_so(built: Swarm) -> None:
     progress = Progress()
     list(drive(built, [Recorder() for _ in range(3)], Late(), 0, 4.0, progress))
@@ -132,6 +142,7 @@ def test_the_schedule_is_in_order() -> None:
         ({"world": "moon"}, "arena"),
         ({"rate_hz": 0.0}, "rate_hz"),
         ({"robots": 2, "only": ("r1", "r3")}, "a swarm of 2 has no robot r3"),
+        ({"only": ("r7",)}, "has no robot r7"),
     ],
 )
 def test_options_that_make_no_sense_say_why(wrong: dict, reason: str) -> None:

@@ -1,0 +1,73 @@
+"""What stands behind the station dies: the router before it, the database, the cluster."""
+
+import pytest
+
+from tests.compose.faults.conftest import Books
+from tests.compose.faults.field import Field
+from tests.compose.faults.record import Record, Row
+
+pytestmark = [pytest.mark.compose, pytest.mark.timeout(1800)]
+
+RESUME_S = 5.0
+
+
+@pytest.fixture
+def behind() -> bool:
+    return True
+
+
+def part(field: Field, name: str) -> str:
+    return str(field.ask("readyz")["parts"][name]["status"])
+
+
+def test_a_router_that_is_killed(field: Field, books: Books, record: Record, run: int) -> None:
+    """Groups stay as they are; the link's part is degraded; rovers are at work again within 5 s of the kill."""
+    used = {robot: report["keyframes"]["used"] for robot, report in field.robots().items()}
+    field.crash("router")
+
+    def goes_on() -> bool:
+        known = field.robots()
+        fresh = all(known[robot]["keyframes"]["used"] > used[robot] + 1 for robot in used)
+        return fresh and field.at_work()
+
+    resumed_s = field.until(goes_on, 60, "new keyframes of everybody")
+    missing = books.close()
+    record.add(
+        Row("router killed", "groups as they were", {}, resumed_s, f"{max(missing.values())} keyframes a rover at most")
+    )
+    assert resumed_s <= RESUME_S
+
+
+def test_a_database_that_is_stopped(field: Field, books: Books, record: Record, run: int) -> None:
+    """The swarm goes on, /readyz is degraded and says why; started again, what waited is written."""
+    field.stop("postgres")
+    noticed_s = field.until(lambda: part(field, "store") == "degraded", 30, "degraded")
+    revision = field.ask("api/v1/groups")["revision"]
+    assert field.at_work()
+    field.start("postgres")
+    back_s = field.until(lambda: part(field, "store") == "ready", 40, "ready")
+    history = field.ask("api/v1/groups/history?limit=1000")
+    assert revision in {item["revision"] for item in history["items"]}
+    assert history["gaps"] == []
+    books.close()
+    record.add(Row("PostgreSQL stopped", "degraded (store)", {"degraded": noticed_s}, back_s))
+
+
+def test_a_worker_that_is_killed(field: Field, books: Books, record: Record, run: int) -> None:
+    """The cluster's only worker dies: threads of the station stand in, until the container is up again."""
+    field.crash("workers")
+    noticed_s = field.until(lambda: part(field, "workers") == "degraded", 30, "degraded")
+    assert field.at_work()
+    back_s = field.until(lambda: part(field, "workers") == "ready", 90, "ready")
+    assert max(books.close().values()) == 0
+    record.add(Row("Dask worker killed", "degraded (workers)", {"degraded": noticed_s}, back_s))
+
+
+def test_a_scheduler_that_is_killed(field: Field, books: Books, record: Record, run: int) -> None:
+    """As with the worker: the station does the work itself until there is a cluster again."""
+    field.crash("scheduler")
+    noticed_s = field.until(lambda: part(field, "workers") == "degraded", 30, "degraded")
+    assert field.at_work()
+    back_s = field.until(lambda: part(field, "workers") == "ready", 120, "ready")
+    assert max(books.close().values()) == 0
+    record.add(Row("Dask scheduler killed", "degraded (workers)", {"degraded": noticed_s}, back_s))
