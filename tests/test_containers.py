@@ -85,7 +85,7 @@ def test_what_is_ours_writes_to_volumes_alone(services: dict[str, Any]) -> None:
 def test_rovers_and_operators_share_no_network_but_through_the_station(services: dict[str, Any]) -> None:
     networks = {name: set(service["networks"]) for name, service in services.items()}
     assert all(networks[name] == {"rovers"} for name in ("r1", "r2", "r3", "load"))
-    assert networks["router"] == {"rovers", "backbone"}
+    assert networks["router"] == {"rovers", "backbone", "field"}
     assert networks["station"] == {"operators", "inner", "${COVISTA_STATION_NETWORK:-rovers}"}
     assert all(networks[name] == {"inner"} for name in ("postgres", "scheduler", "workers"))
     assert services["station"]["environment"]["COVISTA_API"].startswith("station.")
