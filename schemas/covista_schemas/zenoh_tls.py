@@ -78,6 +78,7 @@ def _shake_hands(listening: ssl.SSLContext, joining: ssl.SSLContext) -> str:
             except ssl.SSLWantReadError:
                 continue
     shown = server.getpeercert() or {}
+    # A name has parts, and a part has pairs; the type that typeshed gives is that of every entry.
     subject: tuple[tuple[tuple[str, str], ...], ...] = shown.get("subject", ())  # type: ignore[assignment]
     for name, value in (pair for part in subject for pair in part):
         if name == "commonName":

@@ -8,6 +8,8 @@ from pathlib import Path
 
 from covista_schemas.errors import CovistaError
 
+from covista_service.access.stamps import Stamp, stamps_of
+
 log = logging.getLogger(__name__)
 
 
@@ -46,16 +48,8 @@ class Certificates:
     def _present(self, connection: ssl.SSLObject | ssl.SSLSocket, _name: str | None, _served: ssl.SSLContext) -> None:
         connection.context = self._newest
 
-    def _stamp(self) -> tuple[tuple[int, int, int], ...]:
-        return tuple(_stamp_of(path) for path in (self._cert, self._key))
-
-
-def _stamp_of(path: Path) -> tuple[int, int, int]:
-    try:
-        found = path.stat()
-    except OSError:
-        return (0, 0, 0)
-    return (found.st_ino, found.st_size, found.st_mtime_ns)
+    def _stamp(self) -> Stamp:
+        return stamps_of((self._cert, self._key))
 
 
 def _load(cert: Path, key: Path) -> ssl.SSLContext:

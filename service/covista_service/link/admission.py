@@ -11,13 +11,12 @@ from covista_schemas import keys
 from covista_schemas.errors import KeyExpressionError, LinkError
 from covista_schemas.zenoh_tls import Tls
 
+from covista_service.access.stamps import Stamp, stamps_of
 from covista_service.link.rules import access_control
 
 MAX_ROBOTS = 10_000
 # What is longer is no list of robots.
 _MAX_BYTES = 1_000_000
-
-Stamp = tuple[tuple[int, int, int], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +50,7 @@ class Lock:
 
     def read(self) -> Admission:
         """What the files say now. Raises LinkError, whose text is one line that says what to change."""
-        stamp = _stamps((Path(self.tls.ca), Path(self.tls.cert), Path(self.tls.key)))
+        stamp = stamps_of((Path(self.tls.ca), Path(self.tls.cert), Path(self.tls.key)))
         stations = frozenset((self.tls.common_name(), *self.peers))
         robots = read_robots(self.robots, stations) if self.robots is not None else frozenset[str]()
         return Admission(robots, stations, stamp)
@@ -59,7 +58,7 @@ class Lock:
     def stamp(self) -> Stamp:
         """Another one when a file was changed."""
         files = [Path(self.tls.ca), Path(self.tls.cert), Path(self.tls.key)]
-        return _stamps(files if self.robots is None else [*files, self.robots])
+        return stamps_of(files if self.robots is None else [*files, self.robots])
 
 
 def read_robots(path: Path, taken: Iterable[str] = ()) -> frozenset[str]:
@@ -90,15 +89,3 @@ def read_robots(path: Path, taken: Iterable[str] = ()) -> frozenset[str]:
     if len(found) > MAX_ROBOTS or len(text) > _MAX_BYTES:
         raise LinkError(f"the list of robots {path} is longer than {MAX_ROBOTS} robots or {_MAX_BYTES} bytes")
     return frozenset(found)
-
-
-def _stamps(paths: Iterable[Path]) -> Stamp:
-    return tuple(_stamp_of(path) for path in paths)
-
-
-def _stamp_of(path: Path) -> tuple[int, int, int]:
-    try:
-        found = path.stat()
-    except OSError:
-        return (0, 0, 0)
-    return (found.st_ino, found.st_size, found.st_mtime_ns)

@@ -24,5 +24,6 @@ with zenoh.open(config("client", connect=[sys.argv[1]])) as session:
         session.put(keys.keyframe("default", "u1"), keyframe, congestion_control=block)
         update = codec.encode_pose(PoseUpdate("u1", "later", number, pose)) + UNKNOWN
         session.put(keys.pose("default", "u1"), update, congestion_control=block)
+        # Each is to be opened: what comes closer together gives way to the newest.
         time.sleep(0.2)
 sys.stdout.write(json.dumps({"robot": "u1", "keyframes": SENT, "poses": SENT}))

@@ -1,0 +1,22 @@
+"""Files that are looked at now and then: another stamp when one was changed or replaced."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+# Of each file: inode, size in bytes, time of the last change in nanoseconds; zeros where there is none.
+Stamp = tuple[tuple[int, int, int], ...]
+
+
+def stamps_of(paths: Iterable[Path]) -> Stamp:
+    """The stamps of files as they are now."""
+    return tuple(_stamp_of(path) for path in paths)
+
+
+def _stamp_of(path: Path) -> tuple[int, int, int]:
+    try:
+        found = path.stat()
+    except OSError:
+        return (0, 0, 0)
+    return (found.st_ino, found.st_size, found.st_mtime_ns)
