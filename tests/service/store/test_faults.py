@@ -14,6 +14,7 @@ from covista_service.answers.past import HistoryUnavailableError
 from covista_service.loop import News
 from covista_service.store.database import CONNECT_S, SILENCE_S
 from covista_service.store.history import CLOSE_S
+from sqlalchemy import event
 
 from tests.service.deadline import wait_until
 from tests.service.link.test_publish import news_of, two_robots
@@ -134,6 +135,11 @@ def test_a_disk_that_is_full_or_read_only_is_waited_for(tmp_path: Path, fault: s
     assert well == "well"
 
 
+def grow_no_more(connection: sqlite3.Connection, *_: object) -> None:
+    """Let the file have the pages that it has, and no more."""
+    connection.execute("pragma max_page_count = 1").close()
+
+
 def test_a_database_that_may_not_grow_is_waited_for(file: Path, news: News) -> None:
     """As a full disk, also where no disk can be made."""
     url = f"sqlite:///{file}"
@@ -141,15 +147,16 @@ def test_a_database_that_may_not_grow_is_waited_for(file: Path, news: News) -> N
         history.take(news)
         assert history.flush(10)
         engine = history._writer._engine
-        with engine.connect() as connection:
-            connection.exec_driver_sql("pragma max_page_count = 1")
+        # Whenever a connection is taken: one that is made anew has no limit of its own.
+        event.listen(engine, "checkout", grow_no_more)
         told = 0
         while history.health().status != "degraded":
             told += 1
             history.take(next(numbered(news, 1000 + told)))
             history.flush(0.05)
         assert "full" in str(history.health().detail)
-        wait_until(lambda: history._writer._engine.pool.checkedout() == 0)
+        event.remove(engine, "checkout", grow_no_more)
+        wait_until(lambda: engine.pool.checkedout() == 0)
         engine.dispose()
         wait_until(ready(history))
         assert history.flush(10)
