@@ -49,9 +49,18 @@ Output = Annotated[Format, typer.Option("--format", help="A table for people, or
 Lines = Annotated[Format, typer.Option("--format", help="Lines for people, or a line of JSON per event for programs.")]
 Since = Annotated[
     datetime | None,
-    typer.Option("--from", parser=_moment, metavar="TIME", help="The earliest time, such as 2026-05-04T03:02:01Z."),
+    typer.Option(
+        "--from",
+        parser=_moment,
+        metavar="TIME",
+        help="The earliest time, such as 2026-05-04T03:02:01Z. [the oldest there is]",
+    ),
 ]
-Until = Annotated[datetime | None, typer.Option("--to", parser=_moment, metavar="TIME", help="The latest time.")]
+Until = Annotated[datetime | None, typer.Option("--to", parser=_moment, metavar="TIME", help="The latest time. [now]")]
+Cursor = Annotated[
+    str | None,
+    typer.Option(metavar="NEXT", help="Where an earlier answer ended: its `next`. The other options as then."),
+]
 Limit = Annotated[int, typer.Option(min=1, help="At most so many entries.")]
 Connect = Annotated[
     str, typer.Option(metavar="ENDPOINT", help="End point of the station's zenoh link, or of a router.")

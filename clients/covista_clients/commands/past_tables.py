@@ -57,5 +57,5 @@ def _below(page: HistoryPage) -> list[str]:
         lost = f"{gap.lost} entries" if gap.lost else "entries"
         lines.append(f"{lost} missing from {moment(gap.since)} to {moment(gap.until)}: {escape(gap.reason)}")
     if page.next is not None:
-        lines.append("there is more: --limit, or --from the last time here")
+        lines.append(f"there is more: --limit, or what follows with --cursor {escape(page.next)}")
     return lines

@@ -15,6 +15,7 @@ from covista_clients.commands.interrupting import ends_by_interrupt
 from covista_clients.commands.options import (
     DEFAULT_URL,
     Authorities,
+    Cursor,
     Format,
     Limit,
     Lines,
@@ -57,6 +58,7 @@ def groups_history(
     since: Since = None,
     until: Until = None,
     limit: Limit = _MOST,
+    cursor: Cursor = None,
     url: Url = DEFAULT_URL,
     token: Token = None,
     ca: Authorities = None,
@@ -64,7 +66,7 @@ def groups_history(
 ) -> None:
     """Which groups there were."""
     with station(url, token, ca) as control:
-        _show(control.groups_history, (since, until), limit, past_tables.groups, output)
+        _show(control.groups_history, (since, until), limit, cursor, past_tables.groups, output)
 
 
 @history.command("events")
@@ -72,6 +74,7 @@ def events_history(
     since: Since = None,
     until: Until = None,
     limit: Limit = _MOST,
+    cursor: Cursor = None,
     kind: Annotated[list[str] | None, typer.Option(help="Only this kind; may be given more than once.")] = None,
     robot: Annotated[str | None, typer.Option(help="Only those of this robot.")] = None,
     url: Url = DEFAULT_URL,
@@ -82,7 +85,7 @@ def events_history(
     """What happened."""
     with station(url, token, ca) as control:
         asked = {"kind": kind or None, "robot": robot}
-        _show(control.events_history, (since, until), limit, past_tables.events, output, **asked)
+        _show(control.events_history, (since, until), limit, cursor, past_tables.events, output, **asked)
 
 
 @history.command("pair")
@@ -92,6 +95,7 @@ def pair_history(
     since: Since = None,
     until: Until = None,
     limit: Limit = _MOST,
+    cursor: Cursor = None,
     url: Url = DEFAULT_URL,
     token: Token = None,
     ca: Authorities = None,
@@ -99,7 +103,7 @@ def pair_history(
 ) -> None:
     """How much two robots saw in common."""
     with station(url, token, ca) as control:
-        _show(control.pair_history, (a, b, since, until), limit, past_tables.pair, output)
+        _show(control.pair_history, (a, b, since, until), limit, cursor, past_tables.pair, output)
 
 
 @history.command("track")
@@ -108,6 +112,7 @@ def track(
     since: Since = None,
     until: Until = None,
     limit: Limit = _MOST,
+    cursor: Cursor = None,
     url: Url = DEFAULT_URL,
     token: Token = None,
     ca: Authorities = None,
@@ -115,7 +120,7 @@ def track(
 ) -> None:
     """Where a robot was."""
     with station(url, token, ca) as control:
-        _show(control.track, (robot, since, until), limit, past_tables.track, output)
+        _show(control.track, (robot, since, until), limit, cursor, past_tables.track, output)
 
 
 def _past(control: MissionControl, after: int | None) -> Iterator[EventReport]:
@@ -128,12 +133,13 @@ def _show(
     ask: Callable[..., _H],
     named: tuple[object, ...],
     limit: int,
+    cursor: str | None,
     table: Callable[[_H], RenderableType],
     output: Format,
     **asked: object,
 ) -> None:
     """As many pages as it takes, as one."""
-    page: _H = ask(*named, limit=min(limit, _PAGE), **asked)
+    page: _H = ask(*named, limit=min(limit, _PAGE), cursor=cursor, **asked)
     items, gaps = [*page.items], [*page.gaps]
     while page.next is not None and len(items) < limit:
         page = ask(*named, limit=min(limit - len(items), _PAGE), cursor=page.next, **asked)

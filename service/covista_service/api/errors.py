@@ -28,6 +28,11 @@ _MEANINGS: Mapping[int, str] = {
     503: "Not now: try again after Retry-After seconds",
 }
 PROBLEM_JSON = "application/problem+json"
+# What to do about it, where the framework has no more to say than the status.
+_UNROUTED: Mapping[int, str] = {
+    404: "there is no such path; /openapi.json and /docs list those that there are",
+    405: "this path does not know that method; Allow names those that it knows",
+}
 
 
 class ContradictionError(CovistaError):
@@ -102,7 +107,7 @@ def _refused(request: Request, error: Exception) -> Response:
     if not isinstance(error, HTTPException):
         raise error
     title = HTTPStatus(error.status_code).phrase
-    detail = error.detail if error.detail != title else None
+    detail = error.detail if error.detail != title else _UNROUTED.get(error.status_code)
     return refuse(
         Problem(title=title, status=error.status_code, detail=detail, instance=request.url.path), error.headers
     )

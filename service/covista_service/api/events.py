@@ -11,8 +11,9 @@ from covista_service.answers.past import PAGE
 from covista_service.api import examples
 from covista_service.api.deps import PartsNow
 from covista_service.api.errors import describe
-from covista_service.api.listening import EVENT_STREAM, Listening
+from covista_service.api.listening import Listening
 from covista_service.api.past import PROBLEMS, FromQuery, HistoryCursor, PageQuery, UntilQuery, read_past, span_ns
+from covista_service.api.stream import EVENT_STREAM
 
 router = APIRouter(prefix="/events", tags=["events"])
 
@@ -60,8 +61,8 @@ async def events(parts: PartsNow, last_id: LastIdHeader = None, last_event_id: L
     far as the history has it, with no hole and no repeat. Two kinds are of the stream itself. `reset` says that the
     events from `first` to `last`, as far as there were any, cannot be given again; what follows is complete. `cut` is
     the last word of a stream that the station ends: `data` is a Problem that says why (the station stops, the client
-    reads too slowly, or has listened for an hour), and who asks again with the id of the last event misses nothing. A
-    comment comes where nothing else did for 15 s. At most 256 listen at a time.
+    reads too slowly, has listened for an hour, or its token was revoked), and who asks again with the id of the last
+    event misses nothing. A comment comes where nothing else did for 15 s. At most 256 listen at a time.
     """
     return Listening(parts.stream, parts.archive, parts.readers, last_event_id if last_id is None else last_id)
 

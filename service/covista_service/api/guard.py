@@ -23,6 +23,7 @@ from covista_service.api.delivery import CUT
 from covista_service.api.deps import State
 from covista_service.api.docs_page import FILE_NAMES, FILES
 from covista_service.api.errors import refuse
+from covista_service.api.stream import CUT_EVENT, EVENT_STREAM, encode
 from covista_service.api.timing import PREFIX
 
 # In the scope of a request: the name of the token that it came with, or None.
@@ -85,25 +86,31 @@ def guarded(app: ASGIApp) -> ASGIApp:
 def _while_let_in(scope: Request, by: str | None, send: Send) -> Send:
     """Sends until the token is revoked: a stream of events would outlive it by days."""
     keyring = _gate_of(scope).keyring
-    over = False
+    over = is_stream = False
 
     async def sending(message: Message) -> None:
-        nonlocal over
+        nonlocal over, is_stream
         if over:
             return
-        if message["type"] == "http.response.body" and not keyring.lets_in(by):
+        if message["type"] == "http.response.start":
+            is_stream = Headers(raw=message["headers"]).get("content-type", "").startswith(EVENT_STREAM)
+        elif not keyring.lets_in(by):
             over = True
-            await _cut(scope, send)
+            await _cut(scope, send, is_stream)
             return
         await send(message)
 
     return sending
 
 
-async def _cut(scope: Request, send: Send) -> None:
-    """End an answer short, so that nobody takes it for whole."""
+async def _cut(scope: Request, send: Send, is_stream: bool) -> None:
+    """End an answer short, so that nobody takes it for whole; a stream has a last word for that."""
     extensions: dict[str, Any] = scope.get("extensions") or {}
-    if CUT in extensions:
+    if is_stream:
+        status, detail, _ = _WHY[Refusal.REVOKED]
+        farewell = encode(CUT_EVENT, Problem(title=status.phrase, status=status, detail=detail))
+        await send({"type": "http.response.body", "body": farewell, "more_body": False})
+    elif CUT in extensions:
         extensions[CUT]()
         # The server must hear that the connection is gone before the answer ends.
         await asyncio.sleep(0)

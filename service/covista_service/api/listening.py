@@ -19,12 +19,11 @@ from covista_service.answers.past import Archive, HistoryUnavailableError
 from covista_service.api.delivery import CUT
 from covista_service.api.errors import refuse
 from covista_service.api.rooms import Room
-from covista_service.api.stream import LONG_ENOUGH, CrowdedError, Listener, Stream, encode, missed
+from covista_service.api.stream import EVENT_STREAM, LONG_ENOUGH, CrowdedError, Listener, Stream, encode, missed
 
 HEARTBEAT_S = 15.0
 # In the scope of a request: HEAD was asked, and what has no end must not begin.
 HEAD_ONLY = "covista.head"
-EVENT_STREAM = "text/event-stream"
 _HEARTBEAT = b": alive\n\n"
 _PAGE = 500
 _HEADERS = {"cache-control": "no-store", "x-accel-buffering": "no"}

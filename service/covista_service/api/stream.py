@@ -25,6 +25,9 @@ KEPT = 1024
 # Nobody listens longer without asking anew, so that whoever may not any more is heard of.
 LONGEST_S = 3600.0
 BEHIND, CROWD = "behind", "crowd"
+EVENT_STREAM = "text/event-stream"
+# The last word of a stream that the station ends.
+CUT_EVENT = "cut"
 
 
 # Who is cut off may take so long to hear the last word; where the station stops, so long.
@@ -77,7 +80,7 @@ class Listener:
         if self.ended:
             return
         self.ended = True
-        self._farewell = b"" if farewell is None else encode("cut", farewell)
+        self._farewell = b"" if farewell is None else encode(CUT_EVENT, farewell)
         self._waiting.clear()
         self._awake.set()
         self._last_call = asyncio.get_running_loop().call_later(within_s, self._cut)

@@ -37,7 +37,10 @@ def test_many_entries_take_many_pages(run: Run, api: _Station, monkeypatch: pyte
     whole = EventsHistory.model_validate_json(out)
     assert (len(whole.items), whole.gaps, whole.next) == (200, [sample.GAP], "more")
     assert asked(api) == [{"limit": ["100"]}, {"limit": ["100"], "cursor": ["more"]}]
-    assert "there is more" in run("history", "events", "--url", api.url)[1]
+    assert "--cursor more" in run("history", "events", "--url", api.url)[1]
+    assert "cursor" not in asked(api)[-1]
+    run("history", "events", "--url", api.url, "--cursor", "more")
+    assert asked(api)[-1]["cursor"] == ["more"]
 
 
 def test_events_of_the_past_are_those_after_the_one_named(run: Run, api: _Station) -> None:

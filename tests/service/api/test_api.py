@@ -86,6 +86,7 @@ def test_what_goes_wrong_is_a_problem(desk: Desk, path: str, status: int, title:
     problem = Problem.model_validate_json(response.content)
     assert (problem.status, problem.title) == (status, title)
     assert problem.instance == f"/api/v1{path.partition('?')[0]}"
+    assert problem.detail
 
 
 def test_what_is_malformed_is_named(desk: Desk) -> None:

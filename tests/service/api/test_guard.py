@@ -10,6 +10,7 @@ from covista_schemas.reports import Problem
 from covista_service.access import Attempts, Gate, Keyring, Scope
 from covista_service.access.tokens import new_secret
 from covista_service.api import guard
+from covista_service.api.stream import EVENT_STREAM
 from fastapi import Request
 from fastapi.responses import StreamingResponse
 
@@ -235,6 +236,22 @@ def test_an_answer_under_way_ends_when_its_token_is_revoked_or_the_first_one_mad
     token = {} if open_at_first else {"authorization": f"Bearer {guarded.reader}"}
     assert desk.ask("/stream", **token).text == "before"
     assert desk.ask("/stream", **token).status_code == 401
+
+
+def test_a_stream_whose_token_is_revoked_has_a_last_word_that_says_so(guarded: Guarded) -> None:
+    def parts() -> Iterator[str]:
+        yield ": alive\n\n"
+        guarded.shelf.revoke("reader")
+        guarded.desk.gate.keyring.take(guarded.shelf.read())
+        yield "id: 1\nevent: join\ndata: {}\n\n"
+
+    guarded.desk.app.get("/stream")(lambda: StreamingResponse(parts(), media_type=EVENT_STREAM))
+    told = guarded.ask("/stream", guarded.reader).text
+    alive, last, rest = told.split("\n\n")
+    assert (alive, rest) == (": alive", "")
+    name, data = last.splitlines()
+    assert name == "event: cut"
+    assert Problem.model_validate_json(data.removeprefix("data: ")).detail == "this token is revoked"
 
 
 def test_every_operation_says_which_token_it_takes_and_what_comes_without_it(guarded: Guarded) -> None:
