@@ -10,14 +10,19 @@ running = pytest.StashKey[Stack]()
 
 
 @pytest.fixture(scope="session")
-def stack(request: pytest.FixtureRequest) -> Iterator[Stack]:
-    """A station and its rovers, started; taken down with their volume whatever happens."""
+def images() -> None:
+    """The images of this tree."""
     if not engine_answers():
         pytest.skip("no Docker engine answers here")
+    of_this_tree().run("build", within_s=1200)
+
+
+@pytest.fixture(scope="session")
+def stack(images: None, request: pytest.FixtureRequest) -> Iterator[Stack]:
+    """A station and its rovers, started; taken down with their volume whatever happens."""
     deployed = of_this_tree()
     request.config.stash[running] = deployed
     try:
-        deployed.run("build", within_s=1200)
         deployed.start()
         yield deployed
     finally:

@@ -11,6 +11,8 @@ from subprocess import CalledProcessError, TimeoutExpired
 from typing import TypeVar
 
 ROOT = Path(__file__).parents[2]
+# Of the images that the tests build.
+TAG = "test"
 Answer = TypeVar("Answer")
 
 
@@ -35,7 +37,11 @@ class Stack:
 
     def url(self) -> str:
         """Where the station's REST is published on this machine."""
-        return f"http://{self.run('port', 'station', '8000').strip()}"
+        return f"http://{self.port('station', 8000)}"
+
+    def port(self, service: str, port: int) -> str:
+        """Address and port of this machine where a service's port is published."""
+        return self.run("port", service, str(port)).strip()
 
     def container(self, service: str) -> str:
         """Id of the service's container, running or not."""
@@ -50,18 +56,24 @@ class Stack:
         self.run("down", "--volumes", "--remove-orphans", "--timeout=10")
 
 
-def of_this_tree() -> Stack:
-    """The deployment that the tests start: not yet built, not yet running."""
-    project = f"covista-test-{os.getpid()}"
-    environment = {
+def of_this_tree(
+    name: str = "", more: tuple[Path, ...] = (), profiles: tuple[str, ...] = (), **environment: str
+) -> Stack:
+    """A deployment of docker/compose.yaml, with more files laid over it: not yet built, not yet running."""
+    project = "-".join(filter(None, ("covista-test", str(os.getpid()), name)))
+    settled = {
         "BASE_IMAGE": said([str(ROOT / "docker" / "base.sh")], within_s=600).strip(),
         # Compose of all versions names the operators' network by it.
         "COMPOSE_PROJECT_NAME": project,
-        "COVISTA_TAG": "test",
+        "COVISTA_TAG": TAG,
         "COVISTA_API_AT": "127.0.0.1:0",
         "COVISTA_LINK_AT": "127.0.0.1:0",
+        "COVISTA_ROUTER_AT": "127.0.0.1:0",
     }
-    return Stack((*compose(), "--project-name", project, "--file", str(ROOT / "docker" / "compose.yaml")), environment)
+    files = (ROOT / "docker" / "compose.yaml", *more)
+    options = [option for file in files for option in ("--file", str(file))]
+    options += [option for profile in profiles for option in ("--profile", profile)]
+    return Stack((*compose(), "--project-name", project, *options), {**settled, **environment})
 
 
 def compose() -> tuple[str, ...]:

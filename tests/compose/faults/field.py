@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import socket
 import subprocess
 import time
@@ -16,14 +15,26 @@ from typing import Any
 
 import httpx
 
-from tests.compose.stack import ROOT, Stack, compose, said, wait_for
+from tests.compose.stack import ROOT, TAG, Stack, of_this_tree, said, wait_for
 
 HERE = Path(__file__).parent
 ROVERS = ("r1", "r2", "r3", "r4")
 TOPICS = ("keyframes", "poses")
-IMAGES = {"station": "covista-test-station", "rover": "covista-test-rover"}
-# As compose.yaml sets them, and how often presence is looked at beside what the machine takes.
+IMAGES = {target: f"covista-{target}:{TAG}" for target in ("station", "rover", "postgres")}
+# Seconds instead of minutes.
 LIVE_AFTER_S, GONE_AFTER_S = 2.0, 4.0
+# Router, database and cluster between: as docs/containers.md says.
+BEHIND_PROFILES = ("router", "postgres", "scale")
+BEHIND = {
+    "COVISTA_STATION_NETWORK": "backbone",
+    "COVISTA_LINK": "",
+    "COVISTA_CONNECT": "tcp/router:7447",
+    "COVISTA_ROVERS_CONNECT": "tcp/router:7447",
+    "COVISTA_DATABASE": "postgresql+psycopg://covista@postgres/covista",
+    "COVISTA_POSTGRES_PASSWORD": "for-tests",
+    "COVISTA_POSTGRES_IMAGE": IMAGES["postgres"],
+    "COVISTA_WORKERS": "dask://scheduler:8786",
+}
 # A link that falls silent is given up after its lease.
 LEASE_S = 2.0
 
@@ -33,11 +44,16 @@ class Field:
     """Station and four rovers, each a container; `behind` says that a router, a server and a cluster stand between."""
 
     stack: Stack
-    project: str
-    api_port: int
-    link_port: int
     behind: bool
+    # Where REST answers, and where zenoh does, for who is no container.
+    url: str
+    link: str
     extras: list[str] = field(default_factory=list)
+
+    @property
+    def project(self) -> str:
+        """What the names of networks and containers begin with."""
+        return self.stack.environment["COMPOSE_PROJECT_NAME"]
 
     @property
     def endpoint(self) -> str:
@@ -46,7 +62,7 @@ class Field:
 
     def ask(self, path: str) -> Any:
         """What the station answers; an exception of httpx where it does not."""
-        answer = httpx.get(f"http://127.0.0.1:{self.api_port}/{path}", timeout=5)
+        answer = httpx.get(f"{self.url}/{path}", timeout=5)
         return answer.raise_for_status().json()
 
     def robots(self) -> dict[str, dict[str, Any]]:
@@ -195,20 +211,19 @@ def sums(accounts: Iterable[Mapping[str, Any]]) -> Counter[tuple[str, str]]:
 
 def deploy(*, behind: bool) -> Field:
     """Start a deployment of images that are built, and wait until the swarm is at work."""
-    project = f"covista-test-{os.getpid()}-{'behind' if behind else 'plain'}"
-    ports = free_ports(2)
-    environment = {"API_PORT": str(ports[0]), "LINK_PORT": str(ports[1])}
-    profile: tuple[str, ...] = ()
+    api, link = free_ports(2)
+    # Fixed: a container that starts anew is found where it was.
+    settings = {
+        "COVISTA_API_AT": f"127.0.0.1:{api}",
+        "COVISTA_ROUTER_AT" if behind else "COVISTA_LINK_AT": f"127.0.0.1:{link}",
+        "COVISTA_LIVE_AFTER_S": f"{LIVE_AFTER_S:g}",
+        "COVISTA_GONE_AFTER_S": f"{GONE_AFTER_S:g}",
+    }
     if behind:
-        profile = ("--profile", "behind")
-        environment |= {
-            "ROVERS_CONNECT": "router",
-            "STATION_COMMAND": "covista-station serve --connect tcp/router:7447",
-            "STATION_DATABASE": "postgresql+psycopg://postgres@postgres/postgres",
-            "STATION_WORKERS": "dask://scheduler:8786",
-        }
-    command = (*compose(), "--project-name", project, "--file", str(HERE / "compose.yaml"), *profile)
-    deployed = Field(Stack(command, environment), project, ports[0], ports[1], behind)
+        build_postgres()
+    name, profiles, more = ("behind", tuple(BEHIND_PROFILES), BEHIND) if behind else ("plain", (), {})
+    stack = of_this_tree(name, (HERE / "compose.yaml",), profiles, **settings, **more)
+    deployed = Field(stack, behind, f"http://127.0.0.1:{api}", f"tcp/127.0.0.1:{link}")
     try:
         deployed.stack.start()
         deployed.until(deployed.at_work, 120, "the swarm at work")
@@ -219,24 +234,27 @@ def deploy(*, behind: bool) -> Field:
     return deployed
 
 
-def build() -> None:
-    """The images of this tree, and a PostgreSQL on the same base."""
-    base = f"BASE_IMAGE={said([str(ROOT / 'docker' / 'base.sh')], within_s=600).strip()}"
-    for target, image in IMAGES.items():
-        build_image(image, "--file", str(ROOT / "docker" / "Dockerfile"), "--target", target, "--build-arg", base)
-    docker_file = HERE / "postgres.Dockerfile"
-    build_image("covista-test-postgres", "--file", str(docker_file), "--build-arg", base, context=HERE)
-
-
-def build_image(tag: str, *arguments: str, context: Path = ROOT) -> None:
-    """Build one image."""
-    said(["docker", "build", "--quiet", "--tag", tag, *arguments, str(context)], within_s=1200)
+def build_postgres() -> None:
+    """What takes the place of the public image."""
+    file, base = str(ROOT / "docker" / "Dockerfile"), said([str(ROOT / "docker" / "base.sh")], within_s=600).strip()
+    command = [
+        "docker",
+        "build",
+        "--quiet",
+        "--file",
+        file,
+        "--target",
+        "postgres",
+        "--build-arg",
+        f"BASE_IMAGE={base}",
+    ]
+    said([*command, "--tag", IMAGES["postgres"], str(ROOT)], within_s=1200)
 
 
 def relabel(target: str, tag: str, version: str) -> None:
-    """An image that is another version by its label, and the same by what it does."""
+    """The same image under another tag, and of another version by its label."""
     label = f"org.opencontainers.image.version={version}"
-    command = ["docker", "build", "--quiet", "--tag", tag, "--label", label, "-"]
+    command = ["docker", "build", "--quiet", "--tag", f"covista-{target}:{tag}", "--label", label, "-"]
     subprocess.run(command, input=f"FROM {IMAGES[target]}\n", text=True, check=True, capture_output=True, timeout=300)
 
 

@@ -26,7 +26,7 @@ class Told:
     def __init__(self, field: Field, robot: str) -> None:
         self._heard = threading.Condition()
         self._robots: list[str] | None = None
-        self._session = zenoh.open(config("client", connect=[f"tcp/127.0.0.1:{field.link_port}"]))
+        self._session = zenoh.open(config("client", connect=[field.link]))
         self._subscriber = follow(self._session, keys.own_group("default", robot), self._hear)
 
     def _hear(self, sample: zenoh.Sample) -> None:

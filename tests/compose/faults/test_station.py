@@ -33,10 +33,10 @@ def test_a_station_that_is_killed(field: Field, books: Books, record: Record, ru
 def test_a_station_that_is_upgraded(field: Field, books: Books, record: Record) -> None:
     """The new image starts on the old volume: groups, labels and history are there, and rovers come by themselves."""
     version = "99.0.0"
-    relabel("station", "covista-test-station:next", version)
+    relabel("station", "next", version)
     before = field.ask("api/v1/groups")
     stack = field.stack
-    upgraded = type(stack)(stack.command, {**stack.environment, "STATION_IMAGE": "covista-test-station:next"})
+    upgraded = type(stack)(stack.command, {**stack.environment, "COVISTA_TAG": "next"})
     upgraded.run("up", "--detach", "--no-deps", "station")
     books.station_anew()
     back_s = field.until(field.at_work, 60, "the swarm at work")
