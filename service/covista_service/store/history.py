@@ -30,6 +30,8 @@ LONGEST_PAUSE_S = 5.0
 PERIOD_S = 1.0
 # A database that starts together with the station is waited for so long: it has the numbers and settings to go on with.
 START_S = 5.0
+# A server takes longer than a file when a machine boots, and nothing has it started before the station then.
+SERVER_START_S = 30.0
 _LONGEST_START_PAUSE_S = 1.0
 # Whoever closes waits so long.
 CLOSE_S = 2.0
@@ -50,9 +52,9 @@ class History:
         queue: int = QUEUE,
         first_pause_s: float = FIRST_PAUSE_S,
         period_s: float = PERIOD_S,
-        start_s: float = START_S,
+        start_s: float | None = None,
     ) -> None:
-        """Open the database, if it can be within `start_s`, and one try more.
+        """Open the database, if it can be within `start_s`, and one try more; by default as long as its kind may take.
 
         Raises DatabaseError for a URL that no engine can be made of.
         """
@@ -73,7 +75,7 @@ class History:
         self._more = False
         # Snapshots in a row that could not be stored for what they are.
         self._unremembered = 0
-        self.last = self._used = self._start(start_s)
+        self.last = self._used = self._start(longest_start_s(url) if start_s is None else start_s)
         self._thread = threading.Thread(target=self._run, name="covista-history", daemon=True)
         self._thread.start()
 
@@ -326,6 +328,11 @@ class History:
             if self._problem is None:
                 log.warning("the history waits for its database", extra=about(waiting=len(self._backlog), said=problem))
             self._problem = problem
+
+
+def longest_start_s(url: str) -> float:
+    """How long a database is waited for that starts together with the station."""
+    return START_S if url.startswith("sqlite") else SERVER_START_S
 
 
 def _by(news: News) -> str | None:

@@ -14,12 +14,15 @@ import pytest
 from covista_service.loop import News
 from covista_service.station.events import ForgetRobot
 from covista_service.station.memory import Memory
+from covista_service.store import history as history_module
 from covista_service.store import present
 from covista_service.store.archive import Archive
-from covista_service.store.history import History
+from covista_service.store.history import SERVER_START_S, START_S, History
 from covista_service.store.numbers import BLOCK, LastNumbers, ahead
+from covista_service.store.writer import Writer
 from hypothesis import given
 from hypothesis import strategies as st
+from sqlalchemy.exc import OperationalError
 
 from tests.service.deadline import wait_until
 from tests.service.link.test_publish import news_of, two_robots
@@ -264,6 +267,36 @@ def test_a_database_that_comes_late_is_written_and_a_warning_says_what_stands_tw
         assert history.last.event > news.events[-1].id
 
 
+class Clock:
+    """Time that passes while somebody sleeps."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+
+    def monotonic(self) -> float:
+        return self.now_s
+
+    def sleep(self, seconds: float) -> None:
+        self.now_s += seconds
+
+
+@pytest.mark.parametrize(
+    ("where", "longest_s"),
+    [("sqlite:////nowhere/covista.db", START_S), ("postgresql+psycopg://covista@127.0.0.1:1/none", SERVER_START_S)],
+)
+def test_a_server_is_waited_for_longer_than_a_file(
+    where: str, longest_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def away(_: Writer) -> LastNumbers:
+        raise OperationalError("connect", None, Exception("the database system is starting up"))
+
+    clock = Clock()
+    monkeypatch.setattr(history_module, "time", clock)
+    monkeypatch.setattr(Writer, "start", away)
+    with kept(where, start_s=None):
+        assert longest_s - 1 < clock.now_s <= longest_s
+
+
 def test_a_database_of_a_newer_version_is_not_waited_for(file: Path) -> None:
     url = f"sqlite:///{file}"
     with kept(url):
@@ -310,7 +343,7 @@ VICTIM = """
 import sys, time
 from tests.service.link.test_publish import news_of, two_robots
 from tests.service.store.test_history import FOR_EVER, numbered
-from covista_service.store.history import History
+from covista_service.store.history import SERVER_START_S, START_S, History
 
 history = History(sys.argv[1], retention=FOR_EVER)
 number = history.last.event
