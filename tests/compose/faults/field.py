@@ -236,19 +236,9 @@ def deploy(*, behind: bool) -> Field:
 
 def build_postgres() -> None:
     """What takes the place of the public image."""
-    file, base = str(ROOT / "docker" / "Dockerfile"), said([str(ROOT / "docker" / "base.sh")], within_s=600).strip()
-    command = [
-        "docker",
-        "build",
-        "--quiet",
-        "--file",
-        file,
-        "--target",
-        "postgres",
-        "--build-arg",
-        f"BASE_IMAGE={base}",
-    ]
-    said([*command, "--tag", IMAGES["postgres"], str(ROOT)], within_s=1200)
+    base = said([str(ROOT / "docker" / "base.sh")], within_s=600).strip()
+    command = ["docker", "build", "--quiet", "--build-arg", f"BASE_IMAGE={base}", "--tag", IMAGES["postgres"]]
+    said([*command, str(ROOT / "docker" / "postgres")], within_s=1200)
 
 
 def relabel(target: str, tag: str, version: str) -> None:
