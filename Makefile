@@ -4,8 +4,8 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 # Docker's own subcommand on some machines, a program on others.
 COMPOSE ?= $(shell docker compose version >/dev/null 2>&1 && echo docker compose || echo docker-compose)
-# By the environment, not by a flag: the compose file names a network by it.
-export COMPOSE_PROJECT_NAME ?= covista
+# By the environment, not by a flag: the compose file names a network by it. What docker/.env says comes before our default.
+export COMPOSE_PROJECT_NAME := $(or $(COMPOSE_PROJECT_NAME),$(shell sed -n "s/^COMPOSE_PROJECT_NAME=[\"']\{0,1\}\([^\"' ]*\).*/\1/p" docker/.env 2>/dev/null | tail -n 1),covista)
 STACK := $(COMPOSE) --file docker/compose.yaml
 
 # All tests wait a lot, so several processes share them; the tests of a file stay together.
@@ -56,9 +56,11 @@ bench: .venv/.dev ## The benchmarks, beside their peers
 
 up: ## Station and rovers as containers, in the background
 	@$(call need_engine)
-	@echo "up: building the images and starting station and rovers"
-	@BASE_IMAGE=$$(docker/base.sh) && export BASE_IMAGE && $(STACK) build --quiet && $(STACK) up --detach || \
-		{ echo "Where a port is taken, say another: COVISTA_API_AT=127.0.0.1:8001 COVISTA_LINK_AT=127.0.0.1:7448 make up"; exit 1; }
+	@echo "up: building the images"
+	@BASE_IMAGE=$$(docker/base.sh) && export BASE_IMAGE && $(STACK) build --quiet
+	@echo "up: starting station and rovers"
+	@said=$$($(STACK) up --detach 2>&1) || { echo "$$said"; case "$$said" in (*"already allocated"*|*"already in use"*) \
+		echo "A port is taken, say another: COVISTA_API_AT=127.0.0.1:8001 COVISTA_LINK_AT=127.0.0.1:7448 make up";; esac; exit 1; }
 	@echo "The station answers at http://$$($(STACK) port station 8000)/api/v1/groups; rovers reach it at tcp/$$($(STACK) port station 7447)."
 	@echo "make down ends all; the history stays in the volume $(COMPOSE_PROJECT_NAME)_history."
 

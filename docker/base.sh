@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Prints the name of the image to build on: the public Python image, or where it cannot be pulled an equal base that is made
-# here from Debian's packages. BASE_IMAGE=... overrules it; `docker rmi covista-base:bookworm` has the self-made one made anew.
+# here from Debian's packages. BASE_IMAGE, in the environment or in docker/.env, overrules it;
+# `docker rmi covista-base:bookworm` has the self-made one made anew.
 set -euo pipefail
 
 public=python:3.11-slim-bookworm
@@ -10,8 +11,9 @@ include=python3,python3-venv,ca-certificates
 say() { echo "base.sh: $*" >&2; }
 is_here() { docker image inspect "$1" >/dev/null 2>&1; }
 
-if [ -n "${BASE_IMAGE:-}" ]; then
-  echo "$BASE_IMAGE"
+asked=${BASE_IMAGE:-$(sed -n "s/^BASE_IMAGE=[\"']\{0,1\}\([^\"' ]*\).*/\1/p" "$(dirname "$0")/.env" 2>/dev/null | tail -n 1 || true)}
+if [ -n "$asked" ]; then
+  echo "$asked"
   exit
 fi
 for image in "$public" "$made"; do
