@@ -1,6 +1,9 @@
 """The files of docker/ agree: variables are listed, settings reach the station, bounds hold for all containers."""
 
+import os
 import re
+import shutil
+import subprocess
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -182,3 +185,69 @@ def test_the_images_carry_the_version_of_the_project(text: str) -> None:
     assert f"VERSION: ${{COVISTA_VERSION:-{version}}}" in text
     stages = (DOCKER / "Dockerfile").read_text("utf-8")
     assert stages.count(f"ARG VERSION={version}\n") == 2
+
+
+def run(script: Path, *arguments: str, **environment: str) -> str:
+    command = ["bash" if script.name == "base.sh" else "sh", str(script), *arguments]
+    settled = {"PATH": os.environ["PATH"], **environment}
+    return subprocess.run(command, check=True, capture_output=True, text=True, env=settled, timeout=20).stdout.strip()
+
+
+def test_the_base_is_looked_up_where_compose_looks_for_it(tmp_path: Path) -> None:
+    script = Path(shutil.copy(DOCKER / "base.sh", tmp_path))
+    (tmp_path / ".env").write_text("#BASE_IMAGE=nobody/reads:1\nBASE_IMAGE='from/file:1'  # ours\n")
+    assert run(script) == "from/file:1"
+    assert run(script, BASE_IMAGE="from/around:1") == "from/around:1"
+
+
+def test_make_takes_the_name_of_the_project_where_compose_finds_it(tmp_path: Path) -> None:
+    """Else `docker compose` in the same folder would not see what make started."""
+    shutil.copy(ROOT / "Makefile", tmp_path)
+    (tmp_path / "docker").mkdir()
+
+    def name(**environment: str) -> str:
+        command = ["make", "--silent", "--eval=say: ; @echo $$COMPOSE_PROJECT_NAME", "say"]
+        settled = {"PATH": os.environ["PATH"], **environment}
+        done = subprocess.run(command, check=True, capture_output=True, text=True, cwd=tmp_path, env=settled)
+        return done.stdout.strip()
+
+    assert name() == "covista"
+    (tmp_path / "docker" / ".env").write_text('COMPOSE_PROJECT_NAME="second"\n')
+    assert name() == "second"
+    assert name(COMPOSE_PROJECT_NAME="third") == "third"
+
+
+def test_a_password_is_written_where_the_database_is_asked(tmp_path: Path) -> None:
+    """In the form of libpq, and for nobody else's eyes, or libpq ignores it."""
+    (tmp_path / "password").write_text("a:b\\c\n")
+    places = {"NUMBA_CACHE_DIR": str(tmp_path), "PGPASSFILE": str(tmp_path / "pgpass")}
+    run(DOCKER / "start.sh", "true", COVISTA_POSTGRES_PASSWORD_FILE=str(tmp_path / "password"), **places)
+    written = tmp_path / "pgpass"
+    assert written.read_text() == "*:*:*:*:a\\:b\\\\c\n"
+    assert written.stat().st_mode & 0o077 == 0
+
+
+def test_a_cluster_that_was_begun_is_not_taken_for_one(tmp_path: Path) -> None:
+    """The first start is cut short where the database is made; the second makes all of it anew."""
+    programs, volume = tmp_path / "bin", tmp_path / "data"
+    programs.mkdir()
+    volume.mkdir()
+    script = {
+        "initdb": 'for each; do case "$each" in (--pgdata=*) made=${each#*=};; esac; done\n'
+        'mkdir "$made" && cat >"$made/password" && echo 15 >"$made/PG_VERSION"',
+        "postgres": 'case "$1" in (--single) [ -e "$READY" ];; (*) echo "runs $PGDATA";; esac',
+        "sync": "true",
+    }
+    for name, body in script.items():
+        (programs / name).write_text(f"#!/bin/sh\n{body}\n")
+        (programs / name).chmod(0o755)
+    settings = {"PATH": f"{programs}:{os.environ['PATH']}", "PGDATA": str(volume), "READY": str(tmp_path / "ready")}
+    settings |= {"POSTGRES_USER": "covista", "POSTGRES_DB": "covista", "POSTGRES_PASSWORD": "secret"}
+    with pytest.raises(subprocess.CalledProcessError):
+        run(DOCKER / "postgres" / "entrypoint.sh", **settings)
+    assert not (volume / "cluster").exists()
+    (tmp_path / "ready").touch()
+    for _ in range(2):
+        assert run(DOCKER / "postgres" / "entrypoint.sh", **settings) == f"runs {volume / 'cluster'}"
+    assert (volume / "cluster" / "password").read_text() == "secret\n"
+    assert [each.name for each in volume.iterdir()] == ["cluster"]

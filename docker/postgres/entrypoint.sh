@@ -16,10 +16,8 @@ if [ ! -s "$PGDATA/PG_VERSION" ]; then
     exit 1
   fi
   rm -rf "$volume/new"
-  printf '%s\n' "$password" >/tmp/password
-  initdb --pgdata="$volume/new" --username="$POSTGRES_USER" --pwfile=/tmp/password --auth-local=trust \
-    --auth-host=scram-sha-256 --encoding=UTF8 --locale=C.UTF-8 >/dev/null
-  rm /tmp/password
+  printf '%s\n' "$password" | initdb --pgdata="$volume/new" --username="$POSTGRES_USER" --pwfile=/dev/stdin \
+    --auth-local=trust --auth-host=scram-sha-256 --encoding=UTF8 --locale=C.UTF-8 >/dev/null
   echo "host all all all scram-sha-256" >>"$volume/new/pg_hba.conf"
   echo "CREATE DATABASE $POSTGRES_DB" | postgres --single -D "$volume/new" -j postgres >/dev/null
   sync
