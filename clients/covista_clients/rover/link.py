@@ -47,7 +47,7 @@ def open_with_retry(endpoint: str, stop: threading.Event, tls: Tls | None = None
     told_s = time.monotonic() + PATIENCE_S
     while not stop.is_set():
         try:
-            return zenoh.open(config("client", connect=[endpoint], timeout_ms=OPEN_TIMEOUT_MS, tls=tls))
+            return zenoh.open(config("client", connect=[endpoint], timeout_ms=OPEN_TIMEOUT_MS, tls=tls, narrow=True))
         except zenoh.ZError as error:
             logger.debug("no router at %s yet: %s", endpoint, error)
         if time.monotonic() >= told_s:

@@ -15,7 +15,7 @@ pytestmark = [pytest.mark.compose, pytest.mark.timeout(1800)]
 LATE_S = 3.0
 CUT_S = 20.0
 # A keyframe of the simulated rovers has some 20 kB, two of which go out a second; ten poses take 2 kB.
-NARROW = ("tbf", "rate", "120kbit", "burst", "8kb", "latency", "400ms")
+NARROW = ("tbf", "rate", "120kbit", "burst", "8kb", "limit", "64kb")
 
 
 def test_a_rover_that_leaves_the_network(field: Field, books: Books, record: Record, run: int) -> None:
