@@ -1,6 +1,5 @@
 """What is wrong with certificates is said before zenoh is asked, which does not say."""
 
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -54,22 +53,3 @@ def test_names_of_files_have_a_place_for_the_robot() -> None:
     assert swarm.is_of_each
     assert swarm.of("r7") == Tls("certs/ca.pem", "certs/r7.pem", "certs/r7.key")
     assert not swarm.of("r7").is_of_each
-
-
-def test_robots_are_added_later_and_what_is_there_stays(tmp_path: Path) -> None:
-    make_certificates(tmp_path, "r1")
-    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    make_certificates(tmp_path, "r1", "r2")
-    after = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    assert after.keys() - before.keys() == {"r2.pem", "r2.key"}
-    assert {name for name in before if before[name] != after[name]} == {"robots.txt"}
-    assert after["robots.txt"] == b"r1\nr2\n"
-    assert {path.stat().st_mode & 0o777 for path in tmp_path.glob("*.key")} == {0o600}
-
-
-@pytest.mark.parametrize("robot", ["R1", "../r1", "station", "ca", ""])
-def test_a_name_that_is_no_robots_gets_no_certificate(tmp_path: Path, robot: str) -> None:
-    with pytest.raises(subprocess.CalledProcessError) as caught:
-        make_certificates(tmp_path, robot)
-    assert caught.value.stderr.decode().startswith("certs.sh: ")
-    assert not list(tmp_path.iterdir())
