@@ -6,7 +6,7 @@ import pytest
 from covista_schemas.errors import LinkError
 from covista_schemas.zenoh_tls import Tls
 
-from tests.system.certificates import issue, make_certificates, make_expired, tls_of
+from tests.system.certificates import issue, make_certificates, sign, tls_of
 
 
 @pytest.fixture(scope="module")
@@ -44,8 +44,24 @@ def test_files_of_no_use_are_one_line(certs: Path, ca: str, cert: str, key: str,
 
 
 def test_a_certificate_that_is_out_of_date_is_of_no_use(certs: Path) -> None:
+    assert sign(certs, "r1", days=1).common_name() == "r1"
     with pytest.raises(LinkError, match="certificate has expired"):
-        make_expired(certs, "r1").common_name()
+        sign(certs, "r1", days=-1).common_name()
+
+
+def test_a_station_s_certificate_is_one_that_robots_connect_to(certs: Path) -> None:
+    assert tls_of(certs, "station").common_name(listens=True) == "station"
+    joins = sign(certs, "station", usage="clientAuth")
+    assert joins.common_name() == "station"
+    with pytest.raises(LinkError, match=r"is none that robots connect to, .* \(unsuitable certificate purpose\)"):
+        joins.common_name(listens=True)
+    with pytest.raises(LinkError, match="is not let in by the authority"):
+        sign(certs, "station", usage="serverAuth").common_name(listens=True)
+
+
+def test_a_certificate_without_extensions_is_of_no_use(certs: Path) -> None:
+    with pytest.raises(LinkError, match="X.509 version 1, and has to be of 3"):
+        sign(certs, "r1", usage=None).common_name()
 
 
 def test_names_of_files_have_a_place_for_the_robot() -> None:

@@ -17,7 +17,7 @@ from covista_service.link.switchboard import Switchboard, opening
 from zenoh import ext
 
 from tests.service.deadline import free_endpoint, wait_until
-from tests.system.certificates import make_certificates, make_expired, tls_of
+from tests.system.certificates import make_certificates, sign, tls_of
 
 SITE = "default"
 ROBOTS, STATION = f"covista/{SITE}/robots", f"covista/{SITE}/station"
@@ -252,7 +252,16 @@ def test_a_robot_is_told_that_it_is_heard_and_who_is_not_listed_is_not(scene: Sc
 
 
 @pytest.mark.parametrize(
-    "attempt", ["plain", "foreign authority", "foreign certificate", "trusts a foreign authority", "expired"]
+    "attempt",
+    [
+        "plain",
+        "foreign authority",
+        "foreign certificate",
+        "trusts a foreign authority",
+        "expired",
+        "version 1",
+        "for a listener",
+    ],
 )
 def test_without_a_certificate_of_the_authority_nobody_connects(
     scene: Scene, certs: Path, foreign: Path, attempt: str
@@ -263,12 +272,20 @@ def test_without_a_certificate_of_the_authority_nobody_connects(
         "foreign authority": other,
         "foreign certificate": Tls(own.ca, other.cert, other.key),
         "trusts a foreign authority": Tls(other.ca, own.cert, own.key),
-        "expired": make_expired(certs, "r1"),
+        "expired": sign(certs, "r1", days=-1),
+        "version 1": sign(certs, "r1", usage=None),
+        "for a listener": sign(certs, "r1", usage="serverAuth"),
     }
     tls = shown[attempt]
     endpoint = scene.endpoint if tls else scene.endpoint.replace("tls/", "tcp/")
     with pytest.raises(zenoh.ZError, match="Unable to connect"):
         zenoh.open(config("client", connect=[endpoint], tls=tls, timeout_ms=400))
+
+
+def test_what_the_expired_certificate_was_is_let_in(scene: Scene, certs: Path) -> None:
+    # Made as those above that are refused are, but for the days.
+    with zenoh.open(config("client", connect=[scene.endpoint], tls=sign(certs, "r1", days=1), timeout_ms=1000)) as r1:
+        assert r1.info.routers_zid()
 
 
 def test_a_robot_cannot_pretend_to_be_the_station(certs: Path) -> None:
