@@ -4,6 +4,7 @@ from collections.abc import Callable
 import pytest
 import zenoh
 from covista_schemas.errors import LinkError
+from covista_service.link import admission, mailbox, session
 from covista_service.link.session import open_session
 from covista_service.link.switchboard import Switchboard, opening
 
@@ -28,8 +29,16 @@ def test_an_address_that_is_not_ours_is_named() -> None:
 
 
 def test_a_router_that_is_not_there_does_not_keep_the_station_from_starting() -> None:
-    session = open_session([free_endpoint()], [free_endpoint()])
-    session.close()
+    open_session([free_endpoint()], [free_endpoint()]).close()
+
+
+def test_as_many_links_there_may_be_as_robots_and_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert session.MAX_SESSIONS > max(admission.MAX_ROBOTS, mailbox.MAX_ROBOTS)
+    monkeypatch.setattr(session, "MAX_SESSIONS", 1)
+    endpoint = free_endpoint()
+    with open_session([endpoint], []), open_session([], [endpoint]):
+        with pytest.raises(LinkError, match="no router answers"):
+            open_session([], [endpoint])
 
 
 def test_who_only_joins_needs_a_router_now() -> None:
@@ -40,8 +49,8 @@ def test_who_only_joins_needs_a_router_now() -> None:
 def test_a_switchboard_waits_for_a_router_and_plugs_in_when_there_is_one() -> None:
     endpoint, heard = free_endpoint(), queue.SimpleQueue[str]()
 
-    def join(session: zenoh.Session) -> Callable[[], object]:
-        return session.declare_subscriber("waits/for", lambda sample: heard.put(sample.payload.to_string())).undeclare
+    def join(opened: zenoh.Session) -> Callable[[], object]:
+        return opened.declare_subscriber("waits/for", lambda sample: heard.put(sample.payload.to_string())).undeclare
 
     switchboard = Switchboard(opening([], [endpoint], "default", None), waits=True, every_s=0.02)
     try:
