@@ -1,5 +1,6 @@
 """Attempts on a link that asks for certificates, and what comes of them: real sessions, and openssl's certificates."""
 
+import shutil
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -17,7 +18,7 @@ from covista_service.link.switchboard import Switchboard, opening
 from zenoh import ext
 
 from tests.service.deadline import free_endpoint, wait_until
-from tests.system.certificates import make_certificates, sign, tls_of
+from tests.system.certificates import Pair, make_certificates, put, sign, tls_of
 
 SITE = "default"
 ROBOTS, STATION = f"covista/{SITE}/robots", f"covista/{SITE}/station"
@@ -356,6 +357,34 @@ def test_a_robot_that_is_listed_is_let_in_and_one_that_is_not_any_more_is_shut_o
     assert said.count("zenoh opens again for others to be let in") == 2
     assert said.count("zenoh is open; robots connect within seconds") == 2
     assert "covista-link" not in [thread.name for thread in threading.enumerate()]
+
+
+def test_a_key_that_zenoh_does_not_take_leaves_the_session_as_it_was(certs: Path, tmp_path: Path) -> None:
+    tls = Tls(*(shutil.copy(path, tmp_path) for path in (certs / "ca.pem", certs / "station.pem", certs / "station.key")))
+    lock, endpoint = Lock(tls, certs / "robots.txt"), tls_endpoint()
+    other = sign(certs, "station", usage="serverAuth,clientAuth", curve="secp521r1")
+    assert other.common_name(listens=True) == "station"
+    switchboard = Switchboard(opening([endpoint], [], SITE, lock), lock, every_s=0.02)
+    heard = plug(switchboard)
+    r1 = Visitor(certs, endpoint, "r1")
+    try:
+        wait_until(lambda: r1.heard, "r1 is heard")
+        put(Pair(Path(other.cert), Path(other.key)), Pair(Path(tls.cert), Path(tls.key)))
+        said = wait_until(lambda: switchboard.problem, "the key is not taken")
+        assert said.startswith("who is let in stays as it was: zenoh does not take ")
+        r1.publisher.put("still here")
+        wait_until(lambda: heard() == ["still here"], "what r1 says")
+        put(Pair(certs / "station.pem", certs / "station.key"), Pair(Path(tls.cert), Path(tls.key)))
+        wait_until(lambda: switchboard.problem is None, "what it was is taken")
+    finally:
+        r1.session.close()
+        switchboard.close()
+
+
+def test_who_only_joins_says_at_once_that_zenoh_does_not_take_its_key(certs: Path) -> None:
+    other = sign(certs, "station", usage="serverAuth,clientAuth", curve="secp521r1")
+    with pytest.raises(LinkError, match="zenoh does not take"):
+        Switchboard(opening([], [tls_endpoint()], SITE, Lock(other)), Lock(other), waits=True).close()
 
 
 def test_what_cannot_open_again_is_tried_until_it_can(certs: Path, tmp_path: Path) -> None:
