@@ -40,8 +40,11 @@ class Ears:
     """Keys and words that somebody heard."""
 
     heard: list[tuple[str, str]] = field(default_factory=list)
+    deleted: list[str] = field(default_factory=list)
 
     def take(self, sample: zenoh.Sample) -> None:
+        if sample.kind == zenoh.SampleKind.DELETE:
+            self.deleted.append(str(sample.key_expr))
         self.heard.append((str(sample.key_expr), sample.payload.to_string()))
 
     def wait(self, said: str) -> None:
@@ -53,7 +56,7 @@ class Station:
 
     def __init__(self, session: zenoh.Session) -> None:
         self.ears, self.alive = Ears(), Ears()
-        for topic in ("pose", "keyframe"):
+        for topic in ("pose", "keyframe", "pose/**"):
             session.declare_subscriber(f"{ROBOTS}/*/{topic}", self.ears.take)
         session.liveliness().declare_subscriber(f"{ROBOTS}/*/alive/*", self.alive.take, history=True)
         for key in ("groups", "similarity", "pairs/*/*", "robots/*"):
@@ -151,7 +154,13 @@ def scene(certs: Path) -> Iterator[Scene]:
         ("r2", "r1/pose", False),
         ("r3", "r3/pose", False),
         ("r3", "r1/pose", False),
+        ("r1", "*/pose", False),
+        ("r1", "**", False),
+        ("r1", "r1/*", False),
+        ("r1", "r1/pose/deeper", False),
         ("station", "r1/pose", True),
+        ("station", "*/pose", True),
+        ("station", "r1/pose/deeper", True),
         ("router", "r1/pose", False),
     ],
 )
@@ -167,6 +176,8 @@ def test_a_robot_publishes_under_its_own_id_alone(scene: Scene, who: str, key: s
         ("r1", f"{STATION}/robots/r1/group", True),
         ("r1", f"{STATION}/robots/r2/group", False),
         ("r1", f"{STATION}/robots/*/group", False),
+        ("r1", f"{STATION}/robots/r2/group/@adv/**", False),
+        ("r1", f"{STATION}/**/@adv/**", False),
         ("r1", f"{ROBOTS}/r2/pose", False),
         ("r1", f"{ROBOTS}/*/*", False),
         ("r1", "covista/**", False),
@@ -180,7 +191,7 @@ def test_a_robot_hears_what_is_meant_for_it_alone(scene: Scene, who: str, key: s
     listener = scene.open(who)
     ears, fence, said = Ears(), scene.listens("r2", f"{STATION}/groups"), word()
     listener.declare_subscriber(key, ears.take)
-    list(listener.get(f"{STATION}/groups", timeout=5))
+    _ask_once(listener)
     # The other robot says it, and the station tells it wherever it tells something.
     assert scene.arrives("r2", f"{ROBOTS}/r2/pose")
     scene.of("r2").put(f"{ROBOTS}/r2/pose", said, congestion_control=BLOCK)
@@ -188,11 +199,17 @@ def test_a_robot_hears_what_is_meant_for_it_alone(scene: Scene, who: str, key: s
     for own in ("events", "robots/r1/group", "robots/r2/group", "groups"):
         scene.station.tell(own, said)
     fence.wait(said)
+    # Whatever was on its way to the listener itself is there before this is answered.
+    _ask_once(listener)
     if heard:
         ears.wait(said)
     else:
         assert not ears.heard
     listener.close()
+
+
+def _ask_once(session: zenoh.Session) -> None:
+    list(session.get(f"{STATION}/groups", timeout=5))
 
 
 @pytest.mark.parametrize(
@@ -204,12 +221,31 @@ def test_a_robot_hears_what_is_meant_for_it_alone(scene: Scene, who: str, key: s
         ("r1", f"{STATION}/robots/r2", True),
         ("r1", f"{STATION}/**", False),
         ("r1", "covista/elsewhere/station/groups", False),
+        ("r1", "covista/*/station/groups", False),
         ("r3", f"{STATION}/groups", False),
         ("station", f"{STATION}/**", True),
     ],
 )
 def test_a_robot_asks_what_the_station_answers(scene: Scene, who: str, key: str, answered: bool) -> None:
     assert bool(scene.answers(who, key)) is answered
+
+
+@pytest.mark.parametrize(
+    ("who", "key", "answered"),
+    [
+        ("r1", "robots/r1/group/@adv/**", True),
+        ("r1", "robots/r2/group/@adv/**", False),
+        ("r2", "robots/r2/group/@adv/**", True),
+        ("r1", "robots/*/group/@adv/**", False),
+        ("r1", "**/@adv/**", False),
+        ("station", "**/@adv/**", True),
+    ],
+)
+def test_a_robot_asks_for_what_it_missed_of_its_own(scene: Scene, who: str, key: str, answered: bool) -> None:
+    for robot in ("r1", "r2"):
+        scene.station.tell(f"robots/{robot}/group", word())
+    # The answers are of another key than the question.
+    assert bool(scene.answers(who, f"{STATION}/{key}?_anyke")) is answered
 
 
 @pytest.mark.parametrize(("robot", "alive"), [("r1", True), ("r2", False)])
@@ -226,6 +262,59 @@ def test_a_robot_is_alive_under_its_own_id_alone(scene: Scene, robot: str, alive
     assert (key in shown()) is alive
     token.undeclare()
     fence.undeclare()
+
+
+@pytest.mark.parametrize(
+    ("who", "key", "arrives"),
+    [("r1", "r1/pose", False), ("r1", "r2/pose", False), ("r1", "*/*", False), ("station", "r1/pose", True)],
+)
+def test_a_robot_deletes_nothing(scene: Scene, who: str, key: str, arrives: bool) -> None:
+    before = len(scene.station.ears.deleted)
+    scene.of(who).delete(f"{ROBOTS}/{key}", congestion_control=BLOCK)
+    assert scene.arrives(who, f"{ROBOTS}/r1/pose")
+    assert (len(scene.station.ears.deleted) > before) is arrives
+
+
+def test_a_robot_does_not_learn_who_is_alive(scene: Scene) -> None:
+    key = f"{ROBOTS}/r2/alive/{word().replace(' ', '')}"
+    token = scene.of("r2").liveliness().declare_token(key)
+    wait_until(lambda: key in [each for each, _ in scene.station.alive.heard], "the station sees it")
+    with scene.open("r1") as r1:
+        ears = Ears()
+        for others in (key, f"{ROBOTS}/*/alive/*", f"{ROBOTS}/r2/alive/*", "**"):
+            r1.liveliness().declare_subscriber(others, ears.take, history=True)
+            assert not [each for each in r1.liveliness().get(others, timeout=0.5) if each.ok is not None]
+        _ask_once(r1)
+        assert not ears.heard
+    with scene.open("station") as another:
+        assert [each for each in another.liveliness().get(f"{ROBOTS}/*/alive/*", timeout=5) if each.ok is not None]
+    token.undeclare()
+
+
+@pytest.mark.parametrize("mode", ["peer", "router"])
+def test_a_robot_that_calls_itself_a_peer_or_a_router_may_do_no_more(scene: Scene, certs: Path, mode: str) -> None:
+    made = config("client", connect=[scene.endpoint], tls=tls_of(certs, "r1"))
+    made.insert_json5("mode", f'"{mode}"')
+    before, ears = len(scene.station.ears.heard), Ears()
+    with zenoh.open(made) as opened:
+        for key in ("**", f"{ROBOTS}/**", f"{STATION}/robots/r2/group"):
+            opened.declare_subscriber(key, ears.take)
+        opened.declare_queryable(f"{STATION}/robots/*", lambda query: query.reply(str(query.key_expr), "a lie"))
+        wait_until(lambda: opened.info.transports(), "it is connected")
+        wait_until(lambda: list(opened.get(f"{STATION}/groups", timeout=1)), "it is answered")
+        mine, others = word(), word()
+        opened.put(f"{ROBOTS}/r2/pose", others, congestion_control=BLOCK)
+        opened.put(f"{STATION}/groups", others, congestion_control=BLOCK)
+        opened.put(f"{ROBOTS}/r1/pose", mine, congestion_control=BLOCK)
+        scene.station.ears.wait(mine)
+        assert others not in [said for _, said in scene.station.ears.heard[before:]]
+        assert scene.arrives("r2", f"{ROBOTS}/r2/pose")
+        scene.station.tell("robots/r2/group", others)
+        assert set(scene.answers("r2", f"{STATION}/robots/r1")) == {"the station's"}
+        _ask_once(opened)
+        # A session hears itself, and nobody else.
+        own = [(f"{ROBOTS}/r2/pose", others), (f"{STATION}/groups", others), (f"{ROBOTS}/r1/pose", mine)]
+        assert set(ears.heard) == set(own)
 
 
 def test_a_robot_cannot_speak_for_the_station(scene: Scene) -> None:
@@ -360,7 +449,7 @@ def test_a_robot_that_is_listed_is_let_in_and_one_that_is_not_any_more_is_shut_o
 
 
 def test_a_key_that_zenoh_does_not_take_leaves_the_session_as_it_was(certs: Path, tmp_path: Path) -> None:
-    tls = Tls(*(shutil.copy(path, tmp_path) for path in (certs / "ca.pem", certs / "station.pem", certs / "station.key")))
+    tls = Tls(*(shutil.copy(certs / name, tmp_path) for name in ("ca.pem", "station.pem", "station.key")))
     lock, endpoint = Lock(tls, certs / "robots.txt"), tls_endpoint()
     other = sign(certs, "station", usage="serverAuth,clientAuth", curve="secp521r1")
     assert other.common_name(listens=True) == "station"
