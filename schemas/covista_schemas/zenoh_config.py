@@ -48,8 +48,9 @@ def check_transport(endpoint: str, locked: bool) -> None:
         raise LinkError(f"{shown} is a plain end point; with certificates for zenoh it must be tls/")
     if locked and has_own_tls(endpoint):
         raise LinkError(f"{shown} must not have certificates of its own beside those for zenoh")
-    if locked and (others := [each for each in _options(endpoint) if not _HARMLESS.fullmatch(each)]):
-        raise LinkError(f"{shown} must not have the option {others[0][:80]!r} beside certificates: iface and so_* alone")
+    others = [each for each in _options(endpoint) if not _HARMLESS.fullmatch(each)]
+    if locked and others:
+        raise LinkError(f"{shown} must not have the option {others[0][:80]!r} beside certificates: iface or so_* alone")
     if secure and not locked and not has_own_tls(endpoint):
         raise LinkError(f"{shown} needs certificates for zenoh: an authority, one's own, and its key")
 

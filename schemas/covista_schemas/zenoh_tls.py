@@ -13,7 +13,7 @@ PLACE = "{robot}"
 # Turns of a handshake in memory: it takes three.
 _TURNS = 6
 # Of X.509: what has extensions.
-_VERSION = 3
+_VERSION = "3"
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,8 +94,9 @@ def _shake_hands(listening: ssl.SSLContext, joining: ssl.SSLContext) -> str:
                 continue
     shown = client.getpeercert() or server.getpeercert() or {}
     # OpenSSL takes older ones too, and zenoh does not.
-    if shown and shown["version"] != _VERSION:
-        raise LinkError(f"the certificate is one of X.509 version {shown['version']}, and has to be of {_VERSION}")
+    version = str(shown.get("version", _VERSION))
+    if version != _VERSION:
+        raise LinkError(f"the certificate is one of X.509 version {version}, and has to be of {_VERSION}")
     # A name has parts, and a part has pairs; the type that typeshed gives is that of every entry.
     subject: tuple[tuple[tuple[str, str], ...], ...] = shown.get("subject", ())  # type: ignore[assignment]
     for name, value in (pair for part in subject for pair in part):

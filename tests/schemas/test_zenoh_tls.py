@@ -60,7 +60,7 @@ def test_a_station_s_certificate_is_one_that_robots_connect_to(certs: Path) -> N
 
 
 def test_a_certificate_without_extensions_is_of_no_use(certs: Path) -> None:
-    with pytest.raises(LinkError, match="X.509 version 1, and has to be of 3"):
+    with pytest.raises(LinkError, match=r"X\.509 version 1, and has to be of 3"):
         sign(certs, "r1", usage=None).common_name()
 
 

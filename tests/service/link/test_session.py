@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import pytest
 import zenoh
-from covista_schemas.errors import LinkError
 from covista_schemas import zenoh_config
+from covista_schemas.errors import LinkError
 from covista_service.link import admission, mailbox, session, switchboard
 from covista_service.link.session import open_session
 from covista_service.link.switchboard import Switchboard, opening
@@ -35,12 +35,15 @@ def test_a_router_that_is_not_there_does_not_keep_the_station_from_starting() ->
 
 
 def test_as_many_links_there_may_be_as_robots_and_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert session.MAX_SESSIONS > max(admission.MAX_ROBOTS, mailbox.MAX_ROBOTS)
+    assert max(admission.MAX_ROBOTS, mailbox.MAX_ROBOTS) < session.MAX_SESSIONS
     monkeypatch.setattr(session, "MAX_SESSIONS", 1)
     endpoint = free_endpoint()
-    with open_session([endpoint], []), open_session([], [endpoint]):
-        with pytest.raises(LinkError, match="no router answers"):
-            open_session([], [endpoint])
+    with (
+        open_session([endpoint], []),
+        open_session([], [endpoint]),
+        pytest.raises(LinkError, match="no router answers"),
+    ):
+        open_session([], [endpoint])
 
 
 def test_who_only_joins_needs_a_router_now() -> None:
