@@ -15,7 +15,7 @@ from covista_schemas.zenoh_tls import Tls
 from covista_service.access.stamps import Stamp, stamps_of
 from covista_service.link.rules import access_control
 
-# How many a list may have; as many links there may be (`session.MAX_SESSIONS`).
+# How many a list may have; `session.MAX_SESSIONS` has room for them.
 MAX_ROBOTS = 10_000
 # What is longer is no list of robots.
 _MAX_BYTES = 1_000_000

@@ -49,8 +49,8 @@ def opening(listen: Sequence[str], connect: Sequence[str], site: str, lock: Lock
 class Switchboard:
     """Opens a session, and opens it anew when the files of `lock` change. Raises LinkError where it cannot be opened.
 
-    With `waits` it need not open at once, and is tried until it does. `alive` says which robots have a token, None
-    where nobody knows.
+    With `waits` it is to join a router: it need not open at once, is tried until it does, and anew when no router has
+    answered for a while. `alive` says which robots have a token, None where nobody knows.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class Switchboard:
         self._problem: str | None = None
         self._waits = waits
         self._joined_s = time.monotonic()
-        if waits and lock:
+        if lock:
             try_certificates(lock.tls)
         # Whoever has it may take the session away.
         self._hold = threading.RLock()
@@ -163,7 +163,7 @@ class Switchboard:
                 self._taken = stamp
                 self._read(self._lock)
         if self._waits and self._session is not None:
-            self._leave_alone()
+            self._part_if_alone()
         if self._session is None:
             self._reopen()
         if self._lock is not None and self._lock.robots is not None and self._admission is not None:
@@ -189,7 +189,7 @@ class Switchboard:
         with self._hold:
             self._part()
 
-    def _leave_alone(self) -> None:
+    def _part_if_alone(self) -> None:
         """Part with a session that has had no router for a while."""
         now_s = time.monotonic()
         if self.joined:

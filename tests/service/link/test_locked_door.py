@@ -470,10 +470,12 @@ def test_a_key_that_zenoh_does_not_take_leaves_the_session_as_it_was(certs: Path
         switchboard.close()
 
 
-def test_who_only_joins_says_at_once_that_zenoh_does_not_take_its_key(certs: Path) -> None:
+@pytest.mark.parametrize("joins", [True, False])
+def test_a_key_that_zenoh_does_not_take_is_told_of_at_the_start(certs: Path, joins: bool) -> None:
+    listen, connect = ([], [tls_endpoint()]) if joins else ([tls_endpoint()], [])
     other = sign(certs, "station", usage="serverAuth,clientAuth", curve="secp521r1")
     with pytest.raises(LinkError, match="zenoh does not take"):
-        Switchboard(opening([], [tls_endpoint()], SITE, Lock(other)), Lock(other), waits=True).close()
+        Switchboard(opening(listen, connect, SITE, Lock(other)), Lock(other), waits=joins).close()
 
 
 def test_what_cannot_open_again_is_tried_until_it_can(certs: Path, tmp_path: Path) -> None:
