@@ -35,6 +35,8 @@ NARROW: dict[str, object] = {
 }
 _INTERNET = re.compile(r"(?:tcp|udp|tls|quic|ws)/(?:\[[0-9a-fA-F:.]+\]|[^\s/:\[\]]+):(?P<port>\d{1,5})(?:[?#]\S*)?")
 _OWN_TLS = re.compile("certificate|private_key|mtls|verify_name")
+# Options of an end point that cannot weaken its certificates: on which interface, and the socket's.
+_HARMLESS = re.compile("iface|so_[a-z_]+")
 _OTHER = re.compile(r"(?:unixsock-stream|unixpipe|serial|vsock)/\S+")
 
 
@@ -56,6 +58,9 @@ def check_transport(endpoint: str, locked: bool) -> None:
         raise LinkError(f"{shown} is a plain end point; with certificates for zenoh it must be tls/")
     if locked and has_own_tls(endpoint):
         raise LinkError(f"{shown} must not have certificates of its own beside those for zenoh")
+    others = [each for each in _options(endpoint) if not _HARMLESS.fullmatch(each)]
+    if locked and others:
+        raise LinkError(f"{shown} must not have the option {others[0][:80]!r} beside certificates: iface or so_* alone")
     if secure and not locked and not has_own_tls(endpoint):
         raise LinkError(f"{shown} needs certificates for zenoh: an authority, one's own, and its key")
 
@@ -63,6 +68,10 @@ def check_transport(endpoint: str, locked: bool) -> None:
 def has_own_tls(endpoint: str) -> bool:
     """Whether the options of an end point say which certificates it takes; access control does not know of those."""
     return endpoint.startswith("tls/") and _OWN_TLS.search(endpoint.partition("#")[2]) is not None
+
+
+def _options(endpoint: str) -> list[str]:
+    return [each.partition("=")[0] for each in endpoint.partition("#")[2].split(";") if each]
 
 
 def config(

@@ -12,6 +12,8 @@ from covista_schemas.errors import LinkError
 PLACE = "{robot}"
 # Turns of a handshake in memory: it takes three.
 _TURNS = 6
+# Of X.509: what has extensions.
+_VERSION = "3"
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,10 +33,11 @@ class Tls:
         """Whether each robot has files of its own."""
         return any(PLACE in str(path) for path in (self.cert, self.key))
 
-    def common_name(self) -> str:
-        """Whose certificate it is, once it has proved to be one that others let in.
+    def common_name(self, *, listens: bool = False) -> str:
+        """Whose certificate it is, once it has proved to be one that others let in, or connect to, if it `listens`.
 
-        Raises LinkError for what cannot be read, does not fit together, is out of date or of another authority.
+        Raises LinkError for what cannot be read, does not fit together, is out of date, of another authority, or for
+        another use.
         """
         for what, path in (("the authority", self.ca), ("the certificate", self.cert), ("the key", self.key)):
             _check_readable(what, path)
@@ -53,11 +56,20 @@ class Tls:
                 f"{self.cert} and {self.key} are not a certificate and its key, both PEM and the key without a "
                 f"password ({_reason(error)})"
             ) from error
+        name = self._try(listening, joining, f"is not let in by the authority {self.ca}")
+        if listens:
+            listening.verify_mode = ssl.CERT_NONE
+            joining.load_verify_locations(self.ca)
+            joining.verify_mode = ssl.CERT_REQUIRED
+            self._try(listening, joining, f"is none that robots connect to, by the authority {self.ca}")
+        return name
+
+    def _try(self, listening: ssl.SSLContext, joining: ssl.SSLContext, refused: str) -> str:
         try:
             return _shake_hands(listening, joining)
         except ssl.SSLError as error:
             said = getattr(error, "verify_message", None) or _reason(error)
-            raise LinkError(f"{self.cert} is not let in by the authority {self.ca} ({said})") from error
+            raise LinkError(f"{self.cert} {refused} ({said})") from error
 
 
 def _check_readable(what: str, path: Path | str) -> None:
@@ -68,7 +80,10 @@ def _check_readable(what: str, path: Path | str) -> None:
 
 
 def _shake_hands(listening: ssl.SSLContext, joining: ssl.SSLContext) -> str:
-    """The name of who joins, in memory: what is refused here is refused by zenoh, which does not say why."""
+    """The name of who shows a certificate, in memory: what is refused here zenoh refuses, and does not say why.
+
+    Whoever of the two asks for a certificate has it checked.
+    """
     there, back = ssl.MemoryBIO(), ssl.MemoryBIO()
     server, client = listening.wrap_bio(there, back, server_side=True), joining.wrap_bio(back, there)
     for _ in range(_TURNS):
@@ -77,7 +92,11 @@ def _shake_hands(listening: ssl.SSLContext, joining: ssl.SSLContext) -> str:
                 side.do_handshake()
             except ssl.SSLWantReadError:
                 continue
-    shown = server.getpeercert() or {}
+    shown = client.getpeercert() or server.getpeercert() or {}
+    # OpenSSL takes older ones too, and zenoh does not.
+    version = str(shown.get("version", _VERSION))
+    if version != _VERSION:
+        raise LinkError(f"the certificate is one of X.509 version {version}, and has to be of {_VERSION}")
     # A name has parts, and a part has pairs; the type that typeshed gives is that of every entry.
     subject: tuple[tuple[tuple[str, str], ...], ...] = shown.get("subject", ())  # type: ignore[assignment]
     for name, value in (pair for part in subject for pair in part):

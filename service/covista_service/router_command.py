@@ -43,6 +43,9 @@ def router(
         typer.Option(metavar="NAME", help="Common name of a station's certificate; repeatable. [station]"),
     ] = None,
     site: Annotated[str | None, typer.Option(metavar="SITE", help="Site of the robots. [default]")] = None,
+    insecure: Annotated[
+        bool | None, typer.Option("--insecure", help="Listen beyond loopback without certificates.")
+    ] = None,
     config: Annotated[Path | None, typer.Option(metavar="FILE", help="Settings, as TOML.")] = None,
     zenoh_tls_ca: Ca = None,
     zenoh_tls_cert: Cert = None,
@@ -58,6 +61,7 @@ def router(
         "connect": connect or None,
         "zenoh_tls_peers": peer or None,
         "site": site,
+        "insecure": insecure,
         "zenoh_tls_ca": zenoh_tls_ca,
         "zenoh_tls_cert": zenoh_tls_cert,
         "zenoh_tls_key": zenoh_tls_key,
@@ -81,7 +85,7 @@ def _run(settings: Settings) -> None:
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
-    switchboard = _open(settings)
+    switchboard = open_router(settings)
     try:
         if settings.zenoh_tls is not None:
             signal.signal(signal.SIGHUP, lambda *_: switchboard.renew())
@@ -94,18 +98,25 @@ def _run(settings: Settings) -> None:
         switchboard.close()
 
 
-def _open(settings: Settings) -> Switchboard:
-    from covista_service.access import warn_of_open_doors
+def open_router(settings: Settings) -> Switchboard:
+    """A router that listens. Raises AccessError where it would be open to the network, and LinkError."""
+    from covista_service.access import check_listening
     from covista_service.link.admission import Lock
+    from covista_service.link.alive import Alive
     from covista_service.link.switchboard import Switchboard, opening
     from covista_service.link.zenoh_log import follow_zenoh_log
 
-    warn_of_open_doors(settings.link)
-    lock = None
+    # It has no REST interface to be open.
+    check_listening("localhost", settings.link, insecure=settings.insecure)
+    lock, alive = None, Alive(settings.site)
     if settings.zenoh_tls is not None:
         follow_zenoh_log()
         lock = Lock(settings.zenoh_tls, settings.zenoh_tls_robots, settings.zenoh_tls_peers or DEFAULT_PEERS)
-    return Switchboard(opening(settings.link, settings.connect, settings.site, lock), lock, waits=not settings.link)
+    open_for = opening(settings.link, settings.connect, settings.site, lock)
+    switchboard = Switchboard(open_for, lock, waits=not settings.link, alive=alive.robots)
+    if lock is not None:
+        switchboard.plug(alive.join)
+    return switchboard
 
 
 def _own_words(error: CovistaError) -> str:

@@ -10,6 +10,7 @@ GOOD = [
     "tcp/127.0.0.1:7447",
     "tcp/station:7447",
     "tls/[::1]:7447",
+    "tls/h:1#iface=lo;so_rcvbuf=65000;",
     "udp/0.0.0.0:1",
     "unixsock-stream//tmp/x",
     "tcp/h:1#iface=lo",
@@ -44,6 +45,9 @@ def test_end_points_are_taken(endpoint: str) -> None:
         ("tls/station:7447", False, "needs certificates"),
         ("tls/station:7447#enable_mtls=false", True, "must not have certificates of its own"),
         ("tls/station:7447#listen_private_key_base64=secret", True, "must not have certificates of its own"),
+        ("tls/station:7447#close_link_on_expiration=false", True, "the option 'close_link_on_expiration'"),
+        ("tls/station:7447#iface=lo;tls_handshake_timeout_ms=1", True, "the option 'tls_handshake_timeout_ms'"),
+        ("tls/station:7447#SO_SNDBUF=1", True, "the option 'SO_SNDBUF'"),
     ],
 )
 def test_end_points_are_all_locked_or_none(endpoint: str, tls: bool, said: str) -> None:

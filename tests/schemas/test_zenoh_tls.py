@@ -1,13 +1,12 @@
 """What is wrong with certificates is said before zenoh is asked, which does not say."""
 
-import subprocess
 from pathlib import Path
 
 import pytest
 from covista_schemas.errors import LinkError
 from covista_schemas.zenoh_tls import Tls
 
-from tests.system.certificates import issue, make_certificates, make_expired, tls_of
+from tests.system.certificates import issue, make_certificates, sign, tls_of
 
 
 @pytest.fixture(scope="module")
@@ -45,8 +44,24 @@ def test_files_of_no_use_are_one_line(certs: Path, ca: str, cert: str, key: str,
 
 
 def test_a_certificate_that_is_out_of_date_is_of_no_use(certs: Path) -> None:
+    assert sign(certs, "r1", days=1).common_name() == "r1"
     with pytest.raises(LinkError, match="certificate has expired"):
-        make_expired(certs, "r1").common_name()
+        sign(certs, "r1", days=-1).common_name()
+
+
+def test_a_station_s_certificate_is_one_that_robots_connect_to(certs: Path) -> None:
+    assert tls_of(certs, "station").common_name(listens=True) == "station"
+    joins = sign(certs, "station", usage="clientAuth")
+    assert joins.common_name() == "station"
+    with pytest.raises(LinkError, match=r"is none that robots connect to, .* \(unsuitable certificate purpose\)"):
+        joins.common_name(listens=True)
+    with pytest.raises(LinkError, match="is not let in by the authority"):
+        sign(certs, "station", usage="serverAuth").common_name(listens=True)
+
+
+def test_a_certificate_without_extensions_is_of_no_use(certs: Path) -> None:
+    with pytest.raises(LinkError, match=r"X\.509 version 1, and has to be of 3"):
+        sign(certs, "r1", usage=None).common_name()
 
 
 def test_names_of_files_have_a_place_for_the_robot() -> None:
@@ -54,22 +69,3 @@ def test_names_of_files_have_a_place_for_the_robot() -> None:
     assert swarm.is_of_each
     assert swarm.of("r7") == Tls("certs/ca.pem", "certs/r7.pem", "certs/r7.key")
     assert not swarm.of("r7").is_of_each
-
-
-def test_robots_are_added_later_and_what_is_there_stays(tmp_path: Path) -> None:
-    make_certificates(tmp_path, "r1")
-    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    make_certificates(tmp_path, "r1", "r2")
-    after = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    assert after.keys() - before.keys() == {"r2.pem", "r2.key"}
-    assert {name for name in before if before[name] != after[name]} == {"robots.txt"}
-    assert after["robots.txt"] == b"r1\nr2\n"
-    assert {path.stat().st_mode & 0o777 for path in tmp_path.glob("*.key")} == {0o600}
-
-
-@pytest.mark.parametrize("robot", ["R1", "../r1", "station", "ca", ""])
-def test_a_name_that_is_no_robots_gets_no_certificate(tmp_path: Path, robot: str) -> None:
-    with pytest.raises(subprocess.CalledProcessError) as caught:
-        make_certificates(tmp_path, robot)
-    assert caught.value.stderr.decode().startswith("certs.sh: ")
-    assert not list(tmp_path.iterdir())

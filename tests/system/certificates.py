@@ -8,6 +8,14 @@ from pathlib import Path
 from covista_schemas.zenoh_tls import Tls
 
 CERTS = Path(__file__).parents[2] / "docker" / "certs.sh"
+_EXTENSIONS = """
+basicConstraints = critical, CA:FALSE
+keyUsage = critical, digitalSignature
+extendedKeyUsage = {usage}
+subjectAltName = DNS:{name},DNS:localhost,IP:127.0.0.1
+subjectKeyIdentifier = hash
+authorityKeyIdentifier = keyid
+"""
 
 
 @dataclass(frozen=True)
@@ -48,15 +56,30 @@ def make_certificates(folder: Path, *robots: str) -> Path:
     return folder
 
 
-def make_expired(folder: Path, name: str) -> Tls:
-    """A certificate for the key of one of them that was good until yesterday."""
-    tls, request, cert = tls_of(folder, name), folder / "expired.csr", folder / "expired.pem"
-    ask = ["openssl", "req", "-new", "-key", tls.key, "-subj", f"/CN={name}", "-out", request]
-    sign = ["openssl", "x509", "-req", "-in", request, "-CA", tls.ca, "-CAkey", folder / "ca.key"]
-    sign += ["-set_serial", "7", "-days", "-1", "-out", cert]
-    for command in (ask, sign):
-        subprocess.run(command, check=True, capture_output=True)
-    return Tls(tls.ca, cert, tls.key)
+def sign(folder: Path, name: str, *, days: int = 1, usage: str | None = "clientAuth", curve: str = "") -> Tls:
+    """Another certificate of one of them, for its key or one of another `curve`, as the script makes them.
+
+    With `days` -1 it was good until yesterday; without `usage` it has no extensions, and is one of X.509 version 1.
+    """
+    tls = tls_of(folder, name)
+    stem = f"{name}-{days}-{usage}-{curve}".replace(",", "-")
+    key, request, cert = folder / f"{stem}.key", folder / f"{stem}.csr", folder / f"{stem}.pem"
+    if curve:
+        _openssl("genpkey", "-algorithm", "EC", "-pkeyopt", f"ec_paramgen_curve:{curve}", "-out", key)
+    else:
+        key = Path(tls.key)
+    _openssl("req", "-new", "-key", key, "-subj", f"/CN={name}", "-out", request)
+    extensions: list[str | Path] = []
+    if usage is not None:
+        (folder / f"{stem}.cnf").write_text(_EXTENSIONS.format(usage=usage, name=name))
+        extensions = ["-extfile", folder / f"{stem}.cnf"]
+    signed = ("-CA", tls.ca, "-CAkey", folder / "ca.key", "-set_serial", "7", "-days", str(days), "-out", cert)
+    _openssl("x509", "-req", "-in", request, "-sha256", *signed, *extensions)
+    return Tls(tls.ca, cert, key)
+
+
+def _openssl(*words: str | Path) -> None:
+    subprocess.run(["openssl", *words], check=True, capture_output=True)
 
 
 def tls_of(folder: Path, name: str) -> Tls:

@@ -20,6 +20,7 @@ from covista_service.link.inbox import Inbox
 from covista_service.link.mailbox import Mailboxes
 from covista_service.link.station import LinkOptions, StationLink
 from covista_service.link.switchboard import opening
+from covista_service.router_command import open_router
 from covista_service.serve import run
 from covista_service.station.events import KeyframeArrived
 
@@ -274,11 +275,47 @@ def test_a_router_that_cannot_lock_says_so_in_one_line(certs: Path, tmp_path: Pa
     assert line.startswith("setting link (--listen, COVISTA_LINK): 'tcp/127.0.0.1:1' is a plain end point")
 
 
+def test_a_router_tells_of_a_robot_under_another_one_s_name(
+    tmp_path: Path, certs: Path, robots: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("covista_service.link.strangers._MUTE_AFTER_S", 0.5)
+    # The output of this process is not the router's.
+    monkeypatch.setattr("covista_service.link.zenoh_log.follow_zenoh_log", lambda: None)
+    endpoint = tls_endpoint()
+    locked = files(certs, "router") | {"zenoh_tls_robots": str(robots), "zenoh_tls_peers": "station"}
+    switchboard = open_router(settings_for(tmp_path, link=(endpoint,), **locked))
+    with ExitStack() as stack:
+        stack.callback(switchboard.close)
+        stack.enter_context(closing(rover("r2", endpoint, certs)))
+        stack.enter_context(closing(Rover("r2", CAMERA, endpoint, tls=tls_of(certs, "r1"))))
+        refused = switchboard.strangers.refused
+        wait_until(lambda: refused["mute"], "it is told of")
+        assert refused == {"mute": 1, "unlisted": 0}
+    (told,) = (each for each in caplog.records if each.message.endswith("under the name of its certificate"))
+    assert told.fields["robot"] == "r1"
+
+
+def test_a_router_is_open_to_the_network_only_when_told_so(tmp_path: Path) -> None:
+    endpoint = free_endpoint().replace("127.0.0.1", "0.0.0.0")
+    done = command(tmp_path, "router", "--listen", endpoint)
+    assert done.returncode == 1
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"link = {endpoint} would be open to the network")
+    for words, settings in ((["--insecure"], {}), ([], {"insecure": "true"})):
+        log = tmp_path / "router.log"
+        with process(tmp_path, log, "router", "--listen", endpoint, *words, **settings) as router:
+            assert line_of(router) == f"zenoh router on {endpoint}"
+            router.send_signal(signal.SIGTERM)
+            assert router.wait(5) == 0
+        assert "the zenoh link is plain" in log.read_text()
+
+
 def test_a_router_loads_nothing_that_computes() -> None:
     script = """
 import sys
 import covista_service.__main__
-from covista_service.access import warn_of_open_doors
+from covista_service.access import check_listening
+from covista_service.link.alive import Alive
 from covista_service.link.switchboard import Switchboard
 from covista_service.link.zenoh_log import follow_zenoh_log
 print(*({"cv2", "dask", "fastapi", "numba", "scipy"} & set(sys.modules)))

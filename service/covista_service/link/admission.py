@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,7 @@ from covista_schemas.zenoh_tls import Tls
 from covista_service.access.stamps import Stamp, stamps_of
 from covista_service.link.rules import access_control
 
+# How many a list may have; `session.MAX_SESSIONS` has room for them.
 MAX_ROBOTS = 10_000
 # What is longer is no list of robots.
 _MAX_BYTES = 1_000_000
@@ -25,8 +27,8 @@ class Admission:
 
     robots: frozenset[str]
     stations: frozenset[str]
-    # Of the certificates: others need a new session too.
-    stamp: Stamp
+    # Of what is in the certificates and the key: others need a new session too.
+    digest: str
 
     def rules(self, site: str) -> dict[str, Any]:
         """As zenoh's configuration."""
@@ -50,15 +52,29 @@ class Lock:
 
     def read(self) -> Admission:
         """What the files say now. Raises LinkError, whose text is one line that says what to change."""
-        stamp = stamps_of((Path(self.tls.ca), Path(self.tls.cert), Path(self.tls.key)))
-        stations = frozenset((self.tls.common_name(), *self.peers))
+        digest = _digest_of(self._certificates)
+        stations = frozenset((self.tls.common_name(listens=self.robots is not None), *self.peers))
         robots = read_robots(self.robots, stations) if self.robots is not None else frozenset[str]()
-        return Admission(robots, stations, stamp)
+        return Admission(robots, stations, digest)
 
     def stamp(self) -> Stamp:
         """Another one when a file was changed."""
-        files = [Path(self.tls.ca), Path(self.tls.cert), Path(self.tls.key)]
-        return stamps_of(files if self.robots is None else [*files, self.robots])
+        return stamps_of(self._certificates if self.robots is None else [*self._certificates, self.robots])
+
+    @property
+    def _certificates(self) -> list[Path]:
+        return [Path(self.tls.ca), Path(self.tls.cert), Path(self.tls.key)]
+
+
+def _digest_of(paths: Iterable[Path]) -> str:
+    found = hashlib.sha256()
+    for path in paths:
+        try:
+            found.update(hashlib.sha256(path.read_bytes()).digest())
+        except OSError:
+            # Whoever makes use of the file says what is wrong with it.
+            found.update(b"absent")
+    return found.hexdigest()
 
 
 def read_robots(path: Path, taken: Iterable[str] = ()) -> frozenset[str]:

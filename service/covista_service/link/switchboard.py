@@ -16,12 +16,15 @@ import zenoh
 from covista_schemas.errors import LinkError
 
 from covista_service.link.admission import Admission, Lock
-from covista_service.link.session import open_session
+from covista_service.link.session import open_session, try_certificates
 from covista_service.link.strangers import Strangers
 from covista_service.telemetry import about
 
 # How often the files and the links are looked at.
 EVERY_S = 0.5
+# After so long without a router a client takes another id: a router lets nobody in whose id somebody has already, and
+# who has taken it may be a robot with a certificate.
+ALONE_S = 5.0
 _CLOSE_S = 10.0
 
 # Opens a session for those who are let in; None: everybody is.
@@ -46,8 +49,8 @@ def opening(listen: Sequence[str], connect: Sequence[str], site: str, lock: Lock
 class Switchboard:
     """Opens a session, and opens it anew when the files of `lock` change. Raises LinkError where it cannot be opened.
 
-    With `waits` it need not open at once, and is tried until it does. `alive` says which robots have a token, None
-    where nobody knows.
+    With `waits` it is to join a router: it need not open at once, is tried until it does, and anew when no router has
+    answered for a while. `alive` says which robots have a token, None where nobody knows.
     """
 
     def __init__(
@@ -68,6 +71,10 @@ class Switchboard:
         self._taken = self._seen
         self._admission = lock.read() if lock else None
         self._problem: str | None = None
+        self._waits = waits
+        self._joined_s = time.monotonic()
+        if lock:
+            try_certificates(lock.tls)
         # Whoever has it may take the session away.
         self._hold = threading.RLock()
         self._joins: dict[object, Join] = {}
@@ -155,6 +162,8 @@ class Switchboard:
             if asked or (settled and stamp != self._taken):
                 self._taken = stamp
                 self._read(self._lock)
+        if self._waits and self._session is not None:
+            self._part_if_alone()
         if self._session is None:
             self._reopen()
         if self._lock is not None and self._lock.robots is not None and self._admission is not None:
@@ -163,6 +172,8 @@ class Switchboard:
     def _read(self, lock: Lock) -> None:
         try:
             admission = lock.read()
+            if self._admission is None or admission.digest != self._admission.digest:
+                try_certificates(lock.tls)
         except LinkError as error:
             self._problem = f"who is let in stays as it was: {error}"
             log.warning("who is let in on zenoh stays as it was", extra=about(said=str(error)))
@@ -178,6 +189,16 @@ class Switchboard:
         with self._hold:
             self._part()
 
+    def _part_if_alone(self) -> None:
+        """Part with a session that has had no router for a while."""
+        now_s = time.monotonic()
+        if self.joined:
+            self._joined_s = now_s
+        elif now_s - self._joined_s >= ALONE_S:
+            log.warning("no router answers; zenoh opens anew under another id")
+            with self._hold:
+                self._part()
+
     def _reopen(self) -> None:
         begun_s = time.monotonic()
         try:
@@ -192,6 +213,7 @@ class Switchboard:
             self._session = session
             self._parts = {name: join(session) for name, join in self._joins.items()}
         self._problem = None
+        self._joined_s = time.monotonic()
         log.info("zenoh is open; robots connect within seconds", extra=about(s=_seconds(begun_s)))
 
     def _part(self) -> None:

@@ -8,7 +8,7 @@ from covista_schemas.errors import LinkError
 from covista_service.link.admission import MAX_ROBOTS, Lock, read_robots
 from covista_service.link.rules import access_control
 
-from tests.system.certificates import make_certificates, tls_of
+from tests.system.certificates import make_certificates, sign, tls_of
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,28 @@ def test_a_lock_lets_in_the_list_and_the_owner_of_the_certificate(tmp_path: Path
     before = lock.stamp()
     os.utime(certs / "router.pem", ns=(1, 1))
     assert lock.stamp() != before
+    # What is in it is the same: nobody needs a new session.
+    assert lock.read() == admission
+    renewed = sign(certs, "router", usage="serverAuth,clientAuth")
+    os.replace(renewed.cert, certs / "router.pem")
     assert lock.read() != admission
+
+
+@pytest.mark.parametrize("name", ["ca.pem", "station.pem", "station.key", "robots.txt"])
+def test_who_may_read_a_file_is_seen_to_change(tmp_path: Path, name: str) -> None:
+    certs = make_certificates(tmp_path, "r1")
+    lock = Lock(tls_of(certs, "station"), certs / "robots.txt")
+    before = lock.stamp()
+    (certs / name).chmod(0o640)
+    assert lock.stamp() != before
+
+
+def test_who_lets_robots_in_has_a_certificate_that_they_connect_to(tmp_path: Path) -> None:
+    certs = make_certificates(tmp_path, "r1")
+    joins = sign(certs, "station", usage="clientAuth")
+    assert Lock(joins).read().stations == {"station"}
+    with pytest.raises(LinkError, match="is none that robots connect to"):
+        Lock(joins, certs / "robots.txt").read()
 
 
 def test_without_robots_there_are_stations_alone() -> None:

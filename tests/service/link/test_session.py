@@ -1,9 +1,12 @@
 import queue
+import time
 from collections.abc import Callable
 
 import pytest
 import zenoh
+from covista_schemas import zenoh_config
 from covista_schemas.errors import LinkError
+from covista_service.link import admission, mailbox, session, switchboard
 from covista_service.link.session import open_session
 from covista_service.link.switchboard import Switchboard, opening
 
@@ -28,8 +31,19 @@ def test_an_address_that_is_not_ours_is_named() -> None:
 
 
 def test_a_router_that_is_not_there_does_not_keep_the_station_from_starting() -> None:
-    session = open_session([free_endpoint()], [free_endpoint()])
-    session.close()
+    open_session([free_endpoint()], [free_endpoint()]).close()
+
+
+def test_as_many_links_there_may_be_as_robots_and_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert max(admission.MAX_ROBOTS, mailbox.MAX_ROBOTS) < session.MAX_SESSIONS
+    monkeypatch.setattr(session, "MAX_SESSIONS", 1)
+    endpoint = free_endpoint()
+    with (
+        open_session([endpoint], []),
+        open_session([], [endpoint]),
+        pytest.raises(LinkError, match="no router answers"),
+    ):
+        open_session([], [endpoint])
 
 
 def test_who_only_joins_needs_a_router_now() -> None:
@@ -40,19 +54,53 @@ def test_who_only_joins_needs_a_router_now() -> None:
 def test_a_switchboard_waits_for_a_router_and_plugs_in_when_there_is_one() -> None:
     endpoint, heard = free_endpoint(), queue.SimpleQueue[str]()
 
-    def join(session: zenoh.Session) -> Callable[[], object]:
-        return session.declare_subscriber("waits/for", lambda sample: heard.put(sample.payload.to_string())).undeclare
+    def join(opened: zenoh.Session) -> Callable[[], object]:
+        return opened.declare_subscriber("waits/for", lambda sample: heard.put(sample.payload.to_string())).undeclare
 
-    switchboard = Switchboard(opening([], [endpoint], "default", None), waits=True, every_s=0.02)
+    board = Switchboard(opening([], [endpoint], "default", None), waits=True, every_s=0.02)
     try:
-        unplug = switchboard.plug(join)
-        wait_until(lambda: switchboard.problem == "cannot open: no router answers", "it says so")
+        unplug = board.plug(join)
+        wait_until(lambda: board.problem == "cannot open: no router answers", "it says so")
         with open_session([endpoint], []) as router:
-            wait_until(lambda: switchboard.joined and switchboard.problem is None, "they are joined")
+            wait_until(lambda: board.joined and board.problem is None, "they are joined")
             publisher = router.declare_publisher("waits/for")
             wait_until(lambda: publisher.matching_status.matching, "it listens")
             publisher.put("here")
             assert heard.get(timeout=5) == "here"
         unplug()
     finally:
-        switchboard.close()
+        board.close()
+
+
+def test_who_has_taken_the_station_s_id_at_a_router_keeps_it_out_for_seconds_alone(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    endpoint, ids = free_endpoint(), queue.SimpleQueue[str]()
+
+    def join(opened: zenoh.Session) -> Callable[[], object]:
+        ids.put(str(opened.zid()))
+        return lambda: None
+
+    # So that the thief is the first whom the router sees when it comes again.
+    monkeypatch.setattr(zenoh_config, "RETRY", {"period_init_ms": 5000, "period_max_ms": 5000})
+    monkeypatch.setattr(switchboard, "ALONE_S", 2.0)
+    router = open_session([endpoint], [])
+    board = Switchboard(opening([], [endpoint], "default", None), waits=True, every_s=0.02)
+    try:
+        board.plug(join)
+        wait_until(lambda: board.joined, "they are joined")
+        taken, begun_s = ids.get(timeout=5), time.monotonic()
+        router.close()
+        wait_until(lambda: not board.joined, "the router is missed")
+        # It tries at once, and then seconds later.
+        wait_until(lambda: not board.joined and time.monotonic() - begun_s > 0.3, "it has tried")
+        router = open_session([endpoint], [])
+        thief = zenoh_config.config("client", connect=[endpoint])
+        thief.insert_json5("id", f'"{taken}"')
+        with zenoh.open(thief):
+            wait_until(lambda: board.joined, "the station is joined again")
+            assert ids.get(timeout=5) != taken
+        assert "zenoh opens anew under another id" in caplog.text
+    finally:
+        board.close()
+        router.close()

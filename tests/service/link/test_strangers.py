@@ -4,7 +4,7 @@ import pytest
 from covista_service.link.admission import Admission
 from covista_service.link.strangers import Strangers
 
-ADMISSION = Admission(frozenset({"r1", "r2"}), frozenset({"station"}), ())
+ADMISSION = Admission(frozenset({"r1", "r2"}), frozenset({"station"}), "")
 
 
 @dataclass(frozen=True)
