@@ -50,8 +50,8 @@ fuzz: .venv/.fuzz ## A million payloads each for codec and ingest, led by what t
 SOAK_MINUTES ?= 30
 SOAK_OUT ?= build/soak
 soak: .venv/.dev ## Rovers that come, go and fail around one station for half an hour: does anything grow?
-	@echo "soak: $(SOAK_MINUTES) minutes; $(SOAK_OUT) gets soak.png and soak.json"
-	@COVISTA_SOAK_MINUTES=$(SOAK_MINUTES) COVISTA_SOAK_OUT=$(SOAK_OUT) $(BIN)/covista-station bench soak --long
+	@echo "soak: $(SOAK_MINUTES) minutes; $(SOAK_OUT) gets soak.png, soak.json and station.log"
+	@COVISTA_SOAK_MINUTES=$(SOAK_MINUTES) COVISTA_SOAK_OUT=$(SOAK_OUT) $(BIN)/covista-station bench soak --long --strict
 
 bench: .venv/.dev ## The benchmarks, beside their peers
 	@echo "bench: every benchmark in its short form"
