@@ -1,10 +1,12 @@
-"""Looks for bytes that break a law, led by what they reach: `python -m tests.fuzz codec -runs=1000000`.
+"""Looks for bytes that break a law, led by what they reach: `python -m tests.fuzz codec --payloads=1000000`.
 
-What follows the target's name is for libFuzzer: its options, and folders (the first takes what is found on the way), or
-files that are to be run once. But for those it starts from the corpus.
+What else follows the target's name is for libFuzzer: its options, and folders (the first takes what is found on the
+way), or files that are to be run once. But for those it starts from the corpus.
 """
 
 import logging
+import math
+import os
 import random
 import sys
 from pathlib import Path
@@ -14,6 +16,7 @@ import atheris
 # Beyond what a pose may have; keyframes' own limit is too far away for a fuzzer.
 MOST_BYTES = 20_000
 _TELL_EVERY = 100_000
+_PAYLOADS = "--payloads="
 
 with atheris.instrument_imports(include=["covista_schemas"]):
     from tests.fuzz import codec_law
@@ -26,24 +29,35 @@ from tests.fuzz import mutation  # noqa: E402 - imports what is instrumented
 
 
 class Count:
-    """How many payloads were tried: a script has several."""
+    """How many payloads were tried, and in how many goes: a script has several. Ends the process after `most`."""
 
-    def __init__(self, target: str) -> None:
-        self._target = target
-        self._tried = self._told = 0
+    def __init__(self, target: str, most: float) -> None:
+        self._target, self._most = target, most
+        self._tried = self._goes = self._told = 0
 
     def add(self, payloads: int) -> None:
         self._tried += payloads
-        if self._tried - self._told >= _TELL_EVERY:
-            self._told = self._tried
-            print(f"{self._target}: {self._tried} payloads", file=sys.stderr, flush=True)
+        self._goes += 1
+        if self._tried - self._told >= _TELL_EVERY or self._goes == 1 or self._tried >= self._most:
+            self._tell()
+        if self._tried >= self._most:
+            # As libFuzzer does it: what was found is in its folder already.
+            os._exit(0)
+
+    def _tell(self) -> None:
+        self._told = self._tried
+        resident_mb = int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+        told = f"{self._target}: {self._tried} payloads in {self._goes} goes; resident: {resident_mb:.0f} MB"
+        print(told, file=sys.stderr, flush=True)
 
 
 def main(target: str, *options: str) -> None:
     """Run one target to the end; libFuzzer ends the process."""
     # A fault that is caught and logged is told by the law, once.
     logging.disable(logging.CRITICAL)
-    count = Count(target)
+    most = [float(option.removeprefix(_PAYLOADS)) for option in options if option.startswith(_PAYLOADS)]
+    options = tuple(option for option in options if not option.startswith(_PAYLOADS))
+    count = Count(target, *most or [math.inf])
 
     def codec(data: bytes) -> None:
         count.add(1)

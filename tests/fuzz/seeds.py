@@ -13,7 +13,7 @@ from covista_schemas import codec
 from covista_schemas import robot_pb2 as pb
 from covista_schemas.messages import Camera, Distortion, Features, Keyframe, Pose, PoseUpdate
 
-from tests.fuzz.ingest_law import script_of
+from tests.fuzz.ingest_law import ROBOTS, script_of
 
 CORPUS = Path(__file__).parent / "corpus"
 _CAMERA = Camera(fx=30, fy=30, cx=15.5, cy=11.5, width=32, height=24)
@@ -64,8 +64,16 @@ def scripts() -> Iterator[tuple[str, bytes]]:
     )
     yield "pictures", script_of([(_KEYFRAME | _TURN, image)] * 2 + [(_KEYFRAME, features)])
     yield "rivals", script_of([(_KEYFRAME | 8, features), (_POSE_KEY | 8, pose), (_POSE_KEY | _TURN, b"\xff\xff")])
+    # More robots than there is room for, and ends of tokens of more than may take their leave.
+    yield "crowd", script_of([*_poses("r1", "r2"), *((_TOKEN_LOST | at, b"b0") for at in (16, 48, 56)), *_poses("r4")])
     key = b"covista/default/robots/r2/pose"
     yield "keys", script_of([(_ANY, key), (_ANY, key + b"/x"), (_POSE_KEY | 24, pose), (_KEYFRAME | 32, features)])
+
+
+def _poses(*robots: str) -> Iterator[tuple[int, bytes]]:
+    """One of each, on its own key."""
+    for robot in robots:
+        yield _POSE_KEY | ROBOTS.index(robot) << 3, codec.encode_pose(PoseUpdate(robot, "b0", 0, _POSE))
 
 
 def _keyframe(**content: object) -> Keyframe:

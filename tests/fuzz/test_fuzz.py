@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from tests.fuzz import mutation, seeds
 from tests.fuzz.codec_law import check_payload, check_text
-from tests.fuzz.ingest_law import ROBOTS, Line, Record, check_script, parts, records, script_of
+from tests.fuzz.ingest_law import MAX_ROBOTS, ROBOTS, Line, Record, check_script, parts, records, script_of
 from tests.schemas.strategies import ids, keyframes, pose_updates
 
 MOST_CORPUS_BYTES = 100_000
@@ -137,6 +137,16 @@ def test_what_the_codec_s_corpus_holds_keeps_the_law(file: Path) -> None:
 @pytest.mark.parametrize("file", corpus("ingest"), ids=lambda file: file.name)
 def test_what_ingest_s_corpus_holds_keeps_the_law(file: Path) -> None:
     assert check_script(file.read_bytes()) == len(list(records(file.read_bytes())))
+
+
+def test_the_corpus_has_more_robots_than_there_is_room_for() -> None:
+    line = Line()
+    for record in records((seeds.CORPUS / "ingest" / "crowd").read_bytes()):
+        line.take(record)
+    # Two that have a place, two ends of tokens, and no more: neither another end nor another pose.
+    assert line.boxes.depths().robots == 2 * MAX_ROBOTS
+    assert line.boxes.turned_away == {mailbox.TOO_MANY_ROBOTS: 2}
+    line.end()
 
 
 def test_the_corpus_is_small_and_starts_from_what_robots_rightly_say() -> None:

@@ -21,6 +21,7 @@ def bench(
         list[str] | None, typer.Argument(metavar="[NAME]...", help="Benchmarks, as survey or survey/cold_500.")
     ] = None,
     long: Annotated[bool, typer.Option("--long", help="In full, not in the short form.")] = False,
+    strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 if a mark does not hold.")] = False,
     format: Annotated[Literal["table", "json"], typer.Option(help="What to write to stdout.")] = "table",  # noqa: A002 - the flag's name
 ) -> None:
     """Measure, beside what others offer, and say whether the marks hold."""
@@ -44,6 +45,8 @@ def bench(
         typer.echo(json.dumps([row.as_json() for row in rows], allow_nan=False))
     else:
         Console(width=None if Console().is_terminal else _WIDTH).print(_table(rows))
+    if strict and not all(row.holds for row in rows):
+        raise typer.Exit(1)
 
 
 def _table(rows: list[Row]) -> Table:

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
 
-import numpy as np
 from covista_clients.simulation.marching import March
-from scipy import stats
 
 from covista_service.bench.load import LoadOptions
 from covista_service.bench.rig import Rig, free_endpoint, rig
 from covista_service.bench.row import Row
+from covista_service.bench.trend import trend_of
 
 ROBOTS, LONG_ROBOTS = 200, 1000
 MOST_PER_ROBOT_MB = 1.0
@@ -29,23 +27,6 @@ _STEADY_S, _LONG_STEADY_S = 60.0, 600.0
 # Before anybody looks: how many of those seconds again.
 _WARM_SHARE = 0.25
 _LOOK_S = 0.5
-LEFT_OUT = 0.2
-_BLOCKS = 8
-_CONFIDENCE = 0.95
-
-
-@dataclass(frozen=True, slots=True)
-class Trend:
-    """Growth in MB/h and the half width of its confidence interval; growth as a share of what was there before."""
-
-    slope: float
-    margin: float
-    share: float
-
-    @property
-    def flat(self) -> bool:
-        """Can it not be told from no growth, or is it none to speak of?"""
-        return self.slope - self.margin <= 0 or self.share <= FLAT_SHARE
 
 
 def rows(long: bool) -> Iterator[Row]:
@@ -76,8 +57,9 @@ def filled(running: Rig, robots: int, settle_s: float) -> tuple[float, float]:
 def _slope(long: bool) -> Row:
     with rig(LoadOptions(free_endpoint(), robots=_STEADY_ROBOTS, features=_FEATURES)) as running:
         trend = trend_of(observed(running, _LONG_STEADY_S if long else _STEADY_S))
-    mark = f"0 within the interval, or <= {100 * FLAT_SHARE:g} % in all"
-    return _row("slope", trend.slope, trend.margin, "MB/h", mark, holds=trend.flat)
+    verdict = trend.verdict(FLAT_SHARE * trend.level)
+    mark = f"<= {100 * FLAT_SHARE:g} % in all, for sure: {verdict}"
+    return _row("slope", trend.slope, trend.margin, "MB/h", mark, holds=verdict == "flat")
 
 
 def observed(running: Rig, seconds: float) -> list[tuple[float, float]]:
@@ -92,20 +74,6 @@ def observed(running: Rig, seconds: float) -> list[tuple[float, float]]:
         pause.wait(_LOOK_S)
     running.sent()
     return looks
-
-
-def trend_of(looks: Sequence[tuple[float, float]]) -> Trend:
-    """The trend of memory over the last 80 % of looks (seconds, megabytes), four of them or more.
-
-    A line through the means of blocks: memory that was just taken is not given back at once, so that looks of one
-    moment say the same, and a line through them all would seem more certain than it is.
-    """
-    kept = np.array(looks[round(LEFT_OUT * len(looks)) :])
-    blocks = np.array([block.mean(axis=0) for block in np.array_split(kept, min(_BLOCKS, len(kept)))])
-    line = stats.linregress(blocks[:, 0] / 3600, blocks[:, 1])
-    quantile = float(stats.t.ppf((1 + _CONFIDENCE) / 2, len(blocks) - 2))
-    hours = float(np.ptp(kept[:, 0])) / 3600
-    return Trend(float(line.slope), quantile * float(line.stderr), float(line.slope) * hours / float(kept[0, 1]))
 
 
 def _row(case: str, figure: float, margin: float | None, unit: str, mark: str, *, holds: bool) -> Row:

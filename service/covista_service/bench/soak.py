@@ -1,7 +1,7 @@
 """Does anything grow in a station that lives long among rovers that come and go, are killed, pause, and talk garbage?
 
-Runs only when it is named. In the folder COVISTA_SOAK_OUT, if that is set, it leaves what it saw: `soak.json`,
-`soak.png`, and the station's log. COVISTA_SOAK_MINUTES is how long it takes.
+Runs only when it is named. In the folder COVISTA_SOAK_OUT, if that is set, it leaves what it saw, however it ends:
+`soak.json`, `soak.png`, and the station's log. COVISTA_SOAK_MINUTES is how long it takes; trends are judged from 20 on.
 """
 
 from __future__ import annotations
@@ -9,22 +9,26 @@ from __future__ import annotations
 import json
 import math
 import os
+import random
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
 
 from covista_schemas.errors import CovistaError
 
-from covista_service.bench import load
-from covista_service.bench.memory import FLAT_SHARE, Trend, trend_of
+from covista_service.bench import load, soak_script
 from covista_service.bench.row import Row
+from covista_service.bench.soak_accounts import Accounts, accounts_of
+from covista_service.bench.soak_books import Books, Sent
+from covista_service.bench.soak_judge import LEAST_MIN, Judged, judged, seen_in
 from covista_service.bench.soak_plot import Panel, drawn
-from covista_service.bench.soak_station import RETENTION_MB, Look, Samples, SoakStation, quantile_s
-from covista_service.bench.soak_swarm import Sent, SoakSwarm
+from covista_service.bench.soak_process import RoverProcess, garble, name_of
+from covista_service.bench.soak_station import RETENTION_MB, Look, SoakStation
+from covista_service.bench.soak_swarm import SoakSwarm
 from covista_service.drawing.plots import need_matplotlib
 
 OUT, MINUTES = "COVISTA_SOAK_OUT", "COVISTA_SOAK_MINUTES"
@@ -33,43 +37,27 @@ SEED = 0
 ROBOTS, FEATURES = 12, 200
 _LOOK_S = 1.0
 _DRAIN_S, _POLL_S = 20.0, 0.2
-# Latencies are of so many seconds each: some dozens of keyframes.
-_WINDOW_S = 10.0
 # What is written beyond the limit before the oldest goes, and the database's own log of what is not in its file yet.
 _ROOM_MB = 4.0
 
-_row = partial(Row, bench="soak", peer=None, peer_median=None)
-Series = Sequence[tuple[float, float]]
+_row = partial(Row, bench="soak", peer=None, peer_median=None, spread=None)
 
 
-@dataclass(frozen=True, slots=True)
-class Accounts:
-    """What the station says of all messages when nobody sends any more, and what was sent."""
-
-    received: int
-    fates: int
-    waiting: int
-    missing: int
-    duplicate: int
-    sent: Sent
-
-    @property
-    def unaccounted(self) -> int:
-        """Messages with no fate or with two, or beyond the bounds of what was sent."""
-        heard = self.received + self.missing - self.duplicate - self.sent.garbage
-        beyond = max(0, self.sent.least - heard, heard - self.sent.most)
-        return abs(self.received - self.fates - self.waiting) + self.waiting + beyond
-
-
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class Soaked:
-    """What was seen: the station some times, its accounts at the end, what happened how often, and how it ended."""
+    """What was seen so far: the station, what happened how often, and in the end the accounts and how it ended.
 
-    looks: tuple[Look, ...]
-    accounts: Accounts
-    happened: dict[str, int]
-    tracebacks: int
-    status: int | None
+    `compared` accounts of robots of which no boot was killed are `off` by so many messages. So many `died` unasked.
+    """
+
+    looks: list[Look] = field(default_factory=list)
+    accounts: Accounts | None = None
+    happened: dict[str, int] = field(default_factory=dict)
+    compared: int = 0
+    off: int = 0
+    died: int = 0
+    tracebacks: int = 0
+    status: int | None = None
 
 
 def rows(long: bool) -> Iterator[Row]:
@@ -78,11 +66,15 @@ def rows(long: bool) -> Iterator[Row]:
     if out is not None:
         need_matplotlib()
         out.mkdir(parents=True, exist_ok=True)
-    soaked = _soaked(60 * minutes, out)
-    series = series_of(soaked.looks)
-    found = [*_judged(series), *_counted(soaked)]
-    if out is not None:
-        _write(out, soaked, series, found)
+    soaked, trends, found = Soaked(), list[Judged](), list[Row]()
+    try:
+        _soak(soaked, 60 * minutes, out)
+        if minutes >= LEAST_MIN:
+            trends += judged(seen_in(soaked.looks))
+        found += [*(each.row() for each in trends), *_counted(soaked)]
+    finally:
+        if out is not None:
+            _write(out, soaked, trends, found)
     yield from found
 
 
@@ -99,23 +91,35 @@ def _asked(minutes: float) -> tuple[float, Path | None]:
     return minutes, Path(out) if out else None
 
 
-def _soaked(seconds: float, out: Path | None) -> Soaked:
+def _soak(soaked: Soaked, seconds: float, out: Path | None) -> None:
+    """Enter into `soaked` what is seen, as it is: it is there also when a part of it fails."""
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="covista-", ignore_cleanup_errors=True)))
-        station = SoakStation(folder)
+        station = SoakStation(folder, (out or folder) / "station.log")
         stack.callback(station.end)
         station.await_ready()
-        swarm = SoakSwarm(station.link, load.stock(ROBOTS, FEATURES), SEED)
+        stock, chance = load.stock(ROBOTS, FEATURES), random.Random(SEED)
+        books = Books(lambda robot: station.heard(name_of(robot)))
+        present = soak_script.roster(chance, ROBOTS)
+        swarm = SoakSwarm(
+            partial(RoverProcess, station.link, stock),
+            partial(garble, station.link),
+            soak_script.turns(chance, ROBOTS),
+            books,
+            time.monotonic,
+        )
         stack.callback(swarm.end)
-        swarm.gather()
-        looks = tuple(_watched(station, swarm, seconds))
-        swarm.disperse()
-        accounts = _settled(station, swarm.sent)
-        status = station.end()
-        log = station.log.read_text(errors="replace")
-        if out is not None:
-            (out / "station.log").write_text(log)
-        return Soaked(looks, accounts, dict(swarm.happened), log.count("Traceback"), status)
+        try:
+            swarm.gather(present)
+            for look in _watched(station, swarm, seconds):
+                soaked.looks.append(look)
+            _disperse(swarm)
+            soaked.accounts = _settled(station, books.sent)
+            soaked.status = station.end()
+        finally:
+            soaked.happened, soaked.died = dict(swarm.happened), swarm.died
+            soaked.compared, soaked.off = books.compared, books.off
+            soaked.tracebacks = station.log.read_text(errors="replace").count("Traceback")
 
 
 def _watched(station: SoakStation, swarm: SoakSwarm, seconds: float) -> Iterator[Look]:
@@ -127,120 +131,68 @@ def _watched(station: SoakStation, swarm: SoakSwarm, seconds: float) -> Iterator
         time.sleep(max(0.0, now_s + _LOOK_S - time.monotonic()))
 
 
+def _disperse(swarm: SoakSwarm) -> None:
+    while swarm.there:
+        swarm.disperse()
+        time.sleep(_POLL_S)
+
+
 def _settled(station: SoakStation, sent: Sent) -> Accounts:
-    """The accounts, once nothing waits any more."""
+    """The accounts, once they add up or there is no more hope that they will."""
     deadline_s = time.monotonic() + _DRAIN_S
     while True:
         samples = station.samples()
         accounts = accounts_of(samples, sent)
-        if not (accounts.waiting or samples["covista_mail_messages"]) or time.monotonic() > deadline_s:
+        done = not accounts.unaccounted and not samples["covista_mail_messages"]
+        if done or time.monotonic() > deadline_s:
             return accounts
         time.sleep(_POLL_S)
-
-
-def accounts_of(samples: Samples, sent: Sent) -> Accounts:
-    """What metrics say of all messages of both topics, forgotten robots' included."""
-
-    def total(name: str, word: str = "") -> int:
-        found = (value for key, value in samples.items() if key.startswith(f"{name}{{") and word in key)
-        return round(sum(found))
-
-    fates = sum(total("covista_messages_total", f"fate={fate},") for fate in ("used", "replaced", "duplicate"))
-    return Accounts(
-        received=total("covista_messages_total", "fate=received,"),
-        fates=fates + total("covista_dropped_total"),
-        waiting=total("covista_messages_waiting"),
-        missing=total("covista_messages_missing"),
-        duplicate=total("covista_messages_total", "fate=duplicate,"),
-        sent=sent,
-    )
-
-
-def series_of(looks: Sequence[Look]) -> dict[str, Series]:
-    """What must not grow: by name with unit, (s since the first look, value)."""
-    begun_s = looks[0].at_s
-    values: dict[str, Callable[[Look], float]] = {
-        "resident MB": lambda look: look.resident_mb,
-        "files": lambda look: look.files,
-        "threads": lambda look: look.threads,
-        "WAL MB": lambda look: look.wal_mb,
-    }
-    series: dict[str, Series] = {
-        name: [(look.at_s - begun_s, value(look)) for look in looks] for name, value in values.items()
-    }
-    for share in (0.5, 0.99):
-        series[f"p{share * 100:g} ms"] = list(_latencies(looks, share))
-    return series
-
-
-def _latencies(looks: Sequence[Look], share: float) -> Iterator[tuple[float, float]]:
-    before = looks[0]
-    for look in looks[1:]:
-        if look.at_s - before.at_s >= _WINDOW_S:
-            value_s = quantile_s(before, look, share)
-            if value_s is not None:
-                yield (before.at_s + look.at_s) / 2 - looks[0].at_s, 1e3 * value_s
-            before = look
-
-
-def _judged(series: dict[str, Series]) -> Iterator[Row]:
-    mark = f"0 within the interval, or <= {100 * FLAT_SHARE:g} % in all"
-    for name, points in series.items():
-        what, _, unit = name.partition(" ")
-        trend = _trend(points)
-        yield _row(
-            case=what.lower(),
-            median=trend.slope,
-            spread=trend.margin,
-            unit=f"{unit or what}/h",
-            mark=mark,
-            holds=trend.flat,
-        )
-
-
-def _trend(points: Series) -> Trend:
-    """Of what was nothing at first, any growth that can be told from none is too much."""
-    trend = trend_of([(at_s, value + 1e-9) for at_s, value in points])
-    return trend if math.isfinite(trend.margin) else replace(trend, margin=0.0)
 
 
 def _counted(soaked: Soaked) -> Iterator[Row]:
     database_mb = max(look.database_mb for look in soaked.looks)
     most_mb = RETENTION_MB + _ROOM_MB
-    yield _row(
-        case="database",
-        median=database_mb,
-        spread=None,
-        unit="MB",
-        mark=f"<= {most_mb:g} MB",
-        holds=database_mb <= most_mb,
-    )
+    yield _row(case="database", median=database_mb, unit="MB", mark=f"<= {most_mb:g} MB", holds=database_mb <= most_mb)
+    accounts = soaked.accounts
     for case, count, unit in (
-        ("unaccounted", soaked.accounts.unaccounted, "messages"),
+        ("unaccounted", accounts.unaccounted if accounts is not None else -1, "messages"),
+        ("lost_unkilled", soaked.off, "messages"),
+        ("died_unasked", soaked.died, "rovers"),
         ("tracebacks", soaked.tracebacks, "times"),
         ("status", -1 if soaked.status is None else soaked.status, "of the end"),
     ):
-        yield _row(case=case, median=count, spread=None, unit=unit, mark="0", holds=count == 0)
-    things = sum(soaked.happened.values())
-    yield _row(case="happened", median=things, spread=None, unit="times", mark="> 0", holds=things > 0)
+        yield _row(case=case, median=count, unit=unit, mark="0", holds=count == 0)
+    for case, count, unit in (
+        ("received", accounts.received if accounts is not None else 0, "messages"),
+        ("compared", soaked.compared, "accounts"),
+        ("happened", sum(soaked.happened.values()), "times"),
+    ):
+        yield _row(case=case, median=count, unit=unit, mark="> 0", holds=count > 0)
 
 
-def _write(out: Path, soaked: Soaked, series: dict[str, Series], found: Sequence[Row]) -> None:
-    begun_s = soaked.looks[0].at_s
+def _write(out: Path, soaked: Soaked, trends: Sequence[Judged], found: Sequence[Row]) -> None:
+    """All that there is; a soak that broke before it saw anything leaves no more than the log."""
+    if not soaked.looks:
+        return
+    begun_s, seen = soaked.looks[0].at_s, seen_in(soaked.looks)
     told = {
         "rows": [row.as_json() for row in found],
-        "accounts": asdict(soaked.accounts),
+        "accounts": None if soaked.accounts is None else asdict(soaked.accounts),
+        "compared": soaked.compared,
+        "off": soaked.off,
+        "died": soaked.died,
         "happened": soaked.happened,
         "looks": [
             {name: value for name, value in asdict(look).items() if name != "buckets"} | {"at_s": look.at_s - begun_s}
             for look in soaked.looks
         ],
-        "latencies_ms": {name: series[name] for name in series if name.endswith(" ms")},
+        "latencies_ms": {name: seen[name].points for name in ("p50", "p99")},
     }
     (out / "soak.json").write_text(json.dumps(told, allow_nan=False))
-    panels = [Panel(name, points, _trend(points)) for name, points in series.items()]
+    by_name = {each.name: each for each in trends}
+    panels = [Panel(name, each.points, by_name.get(name)) for name, each in seen.items() if each.points]
     panels += [
-        Panel("database MB", [(look.at_s - begun_s, look.database_mb) for look in soaked.looks]),
-        Panel("robots known", [(look.at_s - begun_s, look.robots) for look in soaked.looks]),
+        Panel(name, [(look.at_s - begun_s, getattr(look, name)) for look in soaked.looks])
+        for name in ("database_mb", "robots", "sessions")
     ]
     (out / "soak.png").write_bytes(drawn(panels))

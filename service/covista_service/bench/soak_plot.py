@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from covista_service.bench.memory import LEFT_OUT, Trend
+from covista_service.bench.soak_judge import Judged
+from covista_service.bench.trend import LEFT_OUT
 from covista_service.drawing.plots import COLOURS, INK, PENCIL, blank, png, styled
 
 if TYPE_CHECKING:
@@ -20,11 +21,11 @@ _WIDTH_IN, _PANEL_IN = 10.0, 2.0
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """One thing that was seen, (s, value), and its trend if it was judged by that."""
+    """One thing that was seen, (s, value), and how it was judged by its trend, if it was."""
 
     name: str
     points: Sequence[tuple[float, float]]
-    trend: Trend | None = None
+    judged: Judged | None = None
 
 
 def drawn(panels: Sequence[Panel]) -> bytes:
@@ -44,13 +45,14 @@ def _draw(axes: Axes, panel: Panel) -> None:
     at_min, values = np.array(panel.points).T * [[1 / 60], [1]]
     axes.plot(at_min, values, ".", ms=2.5, color=COLOURS[0])
     axes.set_ylim(0, 1.15 * max(float(values.max()), 1e-3))
-    if panel.trend is None:
+    if panel.judged is None:
         axes.set_title(panel.name, loc="left")
         return
+    trend, verdict = panel.judged.trend, panel.judged.verdict
     kept = slice(round(LEFT_OUT * len(values)), None)
     middle = at_min[kept].mean()
-    line = values[kept].mean() + panel.trend.slope / 60 * (at_min[kept] - middle)
-    axes.plot(at_min[kept], line, color=COLOURS[1] if panel.trend.flat else INK, lw=1.5)
+    line = values[kept].mean() + trend.slope / 60 * (at_min[kept] - middle)
+    axes.plot(at_min[kept], line, color=COLOURS[1] if verdict == "flat" else INK, lw=1.5)
     axes.axvline(at_min[kept][0], color=PENCIL, lw=0.8, ls=":")
-    judged = "flat" if panel.trend.flat else "grows"
-    axes.set_title(f"{panel.name}: {panel.trend.slope:.3g} ± {panel.trend.margin:.2g} an hour, {judged}", loc="left")
+    told = f"{trend.grown:+.2g} ± {trend.unsure:.2g} in all, {verdict}"
+    axes.set_title(f"{panel.name}: {told}", loc="left")

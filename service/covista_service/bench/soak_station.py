@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import httpx
+from covista_schemas.reports import RobotReport
 from prometheus_client.parser import text_string_to_metric_families
 
 from covista_service.bench.rig import LoadError, free_endpoint
@@ -30,7 +31,10 @@ Samples = Mapping[str, float]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """The station at a moment. `buckets` are keyframes by latency so far: (s, so many took no longer)."""
+    """The station at a moment, with robots that it knows and sessions of zenoh.
+
+    `buckets` are keyframes by latency so far: (s, so many took no longer).
+    """
 
     at_s: float
     resident_mb: float
@@ -39,24 +43,25 @@ class Look:
     database_mb: float
     wal_mb: float
     robots: int
+    sessions: int
     buckets: tuple[tuple[float, float], ...]
 
 
 class SoakStation:
-    """A station in `folder`, from its start to its end. Raises LoadError where it does not do its part."""
+    """A station with its database in `folder`, from start to end. Raises LoadError where it does not do its part."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, log: Path) -> None:
         self.link = free_endpoint()
-        self.database, self.log = folder / "covista.db", folder / "station.log"
+        self.database, self.log = folder / "covista.db", log
         url = free_endpoint().removeprefix("tcp/")
         words = ["serve", "--api", url, "--link", self.link, "--database", f"sqlite:///{self.database}"]
         kept = {name: value for name, value in os.environ.items() if not name.startswith("COVISTA_")}
-        with self.log.open("wb") as log:
+        with self.log.open("wb") as lines:
             self._process = subprocess.Popen(  # noqa: S603 - our own interpreter and module
                 [sys.executable, "-m", "covista_service", *words],
                 env=kept | _SETTINGS,
                 stdin=subprocess.DEVNULL,
-                stdout=log,
+                stdout=lines,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
             )
@@ -95,8 +100,20 @@ class SoakStation:
             database_mb=_size_mb(self.database),
             wal_mb=_size_mb(wal),
             robots=round(sum(value for name, value in samples.items() if name.startswith("covista_robots{"))),
+            sessions=round(samples["covista_link_sessions"]),
             buckets=tuple(sorted(_buckets(samples))),
         )
+
+    def heard(self, robot: str) -> int | None:
+        """How many messages it says that the robot has sent, garbage included; None where it knows none."""
+        try:
+            answer = self._client.get(f"/api/v1/robots/{robot}")
+            if answer.status_code == httpx.codes.NOT_FOUND:
+                return None
+            report = RobotReport.model_validate_json(answer.raise_for_status().content)
+        except (httpx.HTTPError, ValueError) as error:
+            raise LoadError(f"the station does not tell of {robot}: {error}") from error
+        return sum(each.received + each.missing - each.duplicate for each in (report.keyframes, report.poses))
 
     def end(self) -> int | None:
         """Tell it to stop; its exit status, None if it had to be killed."""

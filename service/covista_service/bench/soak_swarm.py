@@ -1,195 +1,184 @@
-"""The rovers of the soak: processes that join, leave, are killed, pause, and start again, as chance has it.
+"""The rovers of the soak, which join, leave, are killed, pause, and start again, as its script has it.
 
-What chance has is the same for the same seed; when things happen is up to the machine.
+The script is the same for the same seed. What is not possible at its turn is let be: a pause of who is paused.
 """
 
 from __future__ import annotations
 
-import random
-import signal
-import threading
-import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
-import zenoh
-from covista_clients.simulation.stock import Stock
-from covista_schemas import keys, zenoh_config
+from covista_service.bench.soak_books import Books
+from covista_service.bench.soak_rover import Told
+from covista_service.bench.soak_script import Turn
 
-from covista_service.bench import soak_rover
-from covista_service.bench.load import SITE
-from covista_service.bench.soak_rover import POSE_RATE_HZ, PREFIX, RATE_HZ, TELL_S, Told
-from covista_service.demo import children
-from covista_service.demo.children import Child
-
-# Between two things that happen, on average.
-EVERY_S = 6.0
-# What a boot sent so shortly before it was killed may be lost unheard, and that it was sent is not known for so long.
-LAST_S = 1.0
-_LEAST_PAUSE_S, _MOST_PAUSE_S = 2.0, 15.0
 # A rover that was paused goes on for so long before anything else happens to it: its link may have to be made anew.
-_AFTER_PAUSE_S = 10.0
-_LEAVE_S = 15.0
-LEAVE = "leave"
-_BURST = 300
-_GARBAGE = b"\xff\xff\xff no message of ours"
+AFTER_PAUSE_S = 10.0
+# For leaving in order, and then for the station to have heard all that was sent.
+LEAVE_S, AGREE_S = 15.0, 10.0
+
+
+class Body(Protocol):
+    """A rover's process, or what stands for it. `told` is what it has said so far that it has sent, and when."""
+
+    @property
+    def told(self) -> Sequence[tuple[float, Told]]:
+        """All of it, once it has been closed."""
+
+    def leave(self) -> None:
+        """Tell it to end in order."""
+
+    def kill(self) -> None:
+        """End it at once."""
+
+    def pause(self) -> None:
+        """Stop it where it is."""
+
+    def go_on(self) -> None:
+        """Let it go on."""
+
+    def ended(self) -> bool:
+        """Has it?"""
+
+    def close(self) -> None:
+        """Wait for its end, and read what it has said."""
 
 
 @dataclass(slots=True, eq=False)
 class Boot:
-    """A rover's process, and what it said that it has sent: (when it said so, messages)."""
+    """A rover, and what is happening to it. Once it has left, its books are still to be compared."""
 
-    child: Child
-    listener: threading.Thread
-    told: list[tuple[float, Told]]
+    body: Body
     paused_until_s: float | None = None
     untouched_until_s: float = 0.0
+    leaves_until_s: float | None = None
+    compares_until_s: float | None = None
 
-
-@dataclass(slots=True)
-class Sent:
-    """What all boots that are over have sent, at least and at most, and garbage."""
-
-    least: int = 0
-    most: int = 0
-    garbage: int = 0
+    def free(self, now_s: float) -> bool:
+        """May something happen to it?"""
+        busy = (self.paused_until_s, self.leaves_until_s, self.compares_until_s)
+        return busy == (None, None, None) and now_s >= self.untouched_until_s
 
 
 class SoakSwarm:
-    """Twelve rovers and what happens to them. `happen` is to be called often."""
+    """Rovers and what happens to them. `happen` is to be called often, and returns at once.
 
-    def __init__(self, link: str, stock: Stock, seed: int) -> None:
-        self.sent = Sent()
+    `start` begins a boot of a robot, `garble` sends garbage in its name and says how much.
+    """
+
+    def __init__(
+        self,
+        start: Callable[[int], Body],
+        garble: Callable[[int], int],
+        script: Iterator[Turn],
+        books: Books,
+        clock: Callable[[], float],
+    ) -> None:
         self.happened: Counter[str] = Counter()
-        self._link, self._stock = link, stock
-        self._chance = random.Random(seed)
+        self.died = 0
+        self._start, self._garble, self._script = start, garble, script
+        self._books, self._clock = books, clock
         self._boots: dict[int, Boot] = {}
-        self._next_s = time.monotonic()
+        self._next = next(script)
+        self._next_s = clock() + self._next.gap_s
 
     @property
-    def there(self) -> int:
-        """How many rovers have a process."""
-        return len(self._boots)
+    def there(self) -> frozenset[int]:
+        """Who has a process, or has just left."""
+        return frozenset(self._boots)
 
-    def gather(self) -> None:
-        """Let all join."""
-        for robot in range(self._stock.robots):
+    def gather(self, robots: Sequence[int]) -> None:
+        """Let these join."""
+        for robot in robots:
             self._join(robot)
 
     def happen(self) -> None:
         """Let happen what is due."""
-        now_s = time.monotonic()
-        for boot in self._boots.values():
-            if boot.paused_until_s is not None and boot.paused_until_s <= now_s:
-                self._go_on(boot)
-        if now_s >= self._next_s:
-            self._next_s = now_s + self._chance.expovariate(1 / EVERY_S)
-            self._befall(self._chance.randrange(self._stock.robots), now_s)
+        now_s = self._clock()
+        self._look_after(now_s)
+        while now_s >= self._next_s:
+            self._befall(self._next, now_s)
+            self._next = next(self._script)
+            self._next_s += self._next.gap_s
 
     def disperse(self) -> None:
-        """Let all leave in order, side by side."""
+        """Let all leave in order, once they may; they have when nobody is `there`."""
+        now_s = self._clock()
         for boot in self._boots.values():
             if boot.paused_until_s is not None:
-                self._go_on(boot)
-        time.sleep(_AFTER_PAUSE_S)
+                self._go_on(boot, now_s)
+        self._look_after(now_s)
         for boot in self._boots.values():
-            boot.child.line.send(LEAVE)
-        for robot in list(self._boots):
-            self._see_off(robot)
+            if boot.free(now_s):
+                self._leave(boot, now_s)
 
     def end(self) -> None:
         """Leave no process behind, however the soak ends."""
         for boot in self._boots.values():
-            boot.child.process.kill()
-            boot.child.process.wait()
-            boot.listener.join()
-            boot.child.line.connection.close()
+            boot.body.kill()
+            boot.body.close()
+        self._boots.clear()
 
-    def _befall(self, robot: int, now_s: float) -> None:
-        boot = self._boots.get(robot)
+    def _look_after(self, now_s: float) -> None:
+        for robot, boot in list(self._boots.items()):
+            if boot.compares_until_s is not None:
+                self._compare(robot, boot.compares_until_s, now_s)
+            elif boot.body.ended():
+                self.died += boot.leaves_until_s is None
+                self._over(robot, now_s)
+                boot.compares_until_s = now_s + AGREE_S
+            elif boot.leaves_until_s is not None and boot.leaves_until_s <= now_s:
+                boot.body.kill()
+            elif boot.paused_until_s is not None and boot.paused_until_s <= now_s:
+                self._go_on(boot, now_s)
+
+    def _befall(self, turn: Turn, now_s: float) -> None:
+        boot = self._boots.get(turn.robot)
         if boot is None:
-            self._count("join", self._join, robot)
-        elif boot.paused_until_s is None and now_s >= boot.untouched_until_s:
-            what = self._chance.choice(("leave", "kill", "reboot", "pause", "garbage"))
-            acts: dict[str, Callable[[int], None]] = {
-                "leave": self._leave,
-                "kill": self._kill,
-                "reboot": self._reboot,
-                "pause": self._pause,
-                "garbage": self._garble,
-            }
-            self._count(what, acts[what], robot)
+            self._join(turn.robot)
+            self.happened["join"] += 1
+        elif boot.free(now_s):
+            self._act(turn, boot, now_s)
+            self.happened[turn.act] += 1
 
-    def _count(self, what: str, act: Callable[[int], None], robot: int) -> None:
-        act(robot)
-        self.happened[what] += 1
+    def _act(self, turn: Turn, boot: Boot, now_s: float) -> None:
+        match turn.act:
+            case "leave":
+                self._leave(boot, now_s)
+            case "pause":
+                boot.body.pause()
+                boot.paused_until_s = now_s + turn.pause_s
+            case "garbage":
+                self._books.garbage(turn.robot, self._garble(turn.robot))
+            case "kill" | "reboot":
+                boot.body.kill()
+                self._over(turn.robot, now_s)
+                del self._boots[turn.robot]
+                if turn.act == "reboot":
+                    self._join(turn.robot)
 
     def _join(self, robot: int) -> None:
-        child = children.start(soak_rover.__name__, self._link, self._stock, robot)
-        told: list[tuple[float, Told]] = []
-        listener = threading.Thread(target=_heard, args=(child, told), name=f"told-{robot}", daemon=True)
-        listener.start()
-        self._boots[robot] = Boot(child, listener, told)
+        self._books.join(robot, self._clock())
+        self._boots[robot] = Boot(self._start(robot))
 
-    def _leave(self, robot: int) -> None:
-        self._boots[robot].child.line.send(LEAVE)
-        self._see_off(robot)
+    def _leave(self, boot: Boot, now_s: float) -> None:
+        boot.body.leave()
+        boot.leaves_until_s = now_s + LEAVE_S
 
-    def _see_off(self, robot: int) -> None:
-        child = self._boots[robot].child
-        if not child.ended(_LEAVE_S):
-            child.process.kill()
-        self._over(robot)
+    def _go_on(self, boot: Boot, now_s: float) -> None:
+        boot.body.go_on()
+        boot.paused_until_s, boot.untouched_until_s = None, now_s + AFTER_PAUSE_S
 
-    def _kill(self, robot: int) -> None:
-        self._boots[robot].child.process.kill()
-        self._over(robot)
+    def _over(self, robot: int, now_s: float) -> None:
+        """Enter what a boot has sent into the books."""
+        body = self._boots[robot].body
+        body.close()
+        self._books.over(robot, body.told, now_s)
 
-    def _reboot(self, robot: int) -> None:
-        self._kill(robot)
-        self._join(robot)
-
-    def _pause(self, robot: int) -> None:
-        boot = self._boots[robot]
-        boot.child.process.send_signal(signal.SIGSTOP)
-        boot.paused_until_s = time.monotonic() + self._chance.uniform(_LEAST_PAUSE_S, _MOST_PAUSE_S)
-
-    def _go_on(self, boot: Boot) -> None:
-        boot.child.process.send_signal(signal.SIGCONT)
-        boot.paused_until_s, boot.untouched_until_s = None, time.monotonic() + _AFTER_PAUSE_S
-
-    def _garble(self, robot: int) -> None:
-        """Somebody sends garbage on the rover's keys, as fast as it goes."""
-        name = f"{PREFIX}{robot + 1}"
-        with zenoh.open(zenoh_config.config("client", connect=[self._link])) as session:
-            for number in range(_BURST):
-                key = keys.keyframe(SITE, name) if number % 2 else keys.pose(SITE, name)
-                session.put(key, _GARBAGE, congestion_control=zenoh.CongestionControl.BLOCK)
-        self.sent.garbage += _BURST
-
-    def _over(self, robot: int) -> None:
-        """Enter what a boot has sent into the accounts."""
-        ended_s, boot = time.monotonic(), self._boots.pop(robot)
-        boot.child.process.wait()
-        # Until all that it said is read.
-        boot.listener.join()
-        boot.child.line.connection.close()
-        least, most = bounds(boot.told, ended_s)
-        self.sent.least += least
-        self.sent.most += most
-
-
-def bounds(told: Sequence[tuple[float, Told]], ended_s: float) -> tuple[int, int]:
-    """Least and most messages that a station has to know of, of a boot that said so much and ended at `ended_s`."""
-    last = told[-1][1] if told else Told(0, 0)
-    if last.over:
-        return last.messages, last.messages
-    least = max((said.messages for at_s, said in told if at_s < ended_s - LAST_S), default=0)
-    unsaid = (RATE_HZ + POSE_RATE_HZ) * (LAST_S + 2 * TELL_S) + 2
-    return least, last.messages + round(unsaid)
-
-
-def _heard(child: Child, told: list[tuple[float, Told]]) -> None:
-    while (said := child.line.receive()) is not None:
-        told.append((time.monotonic(), said))
+    def _compare(self, robot: int, until_s: float, now_s: float) -> None:
+        """Now if the books agree, else when there is no more hope that they will."""
+        if self._books.agrees(robot) or now_s >= until_s:
+            self._books.compare(robot)
+            del self._boots[robot]

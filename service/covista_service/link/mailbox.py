@@ -143,7 +143,6 @@ class Mailboxes:
     def __init__(
         self, max_robots: int = MAX_ROBOTS, max_bytes: int = MAX_BYTES, paces: Mapping[Line, Pace] = PACES
     ) -> None:
-        self._max_robots = max_robots
         self._max_bytes = max_bytes
         self._lock = threading.Lock()
         self._mail: dict[str, Mail] = {}
@@ -237,7 +236,7 @@ class Mailboxes:
 
     def _farewell(self, robot: str) -> Mail | None:
         """Mail of a robot whose place was given away, for the end of a token that the station may have heard of."""
-        if len(self._mail) >= 2 * self._max_robots:
+        if not self._places.part(robot):
             self._turned_away[TOO_MANY_ROBOTS] += 1
             return None
         return self._mail_of(robot)
@@ -307,6 +306,7 @@ class Mailboxes:
             self._bytes -= _weight(box.kept)
         if not mail.boxes and not mail.tokens and not mail.garbage:
             del self._mail[mail.robot]
+            self._places.parted(mail.robot)
 
 
 def _weight(letter: Letter | None) -> int:

@@ -21,6 +21,9 @@ class Places:
 
     Strangers among them have sent nothing but garbage. Callers have sent no message either, but have a token: a token
     costs nothing, so that they give way to whoever sends a message.
+
+    Whoever has no place and still has mail is parting. Callers may have to part at any time, so that both together are
+    no more than there are places: never does the mail of more than twice as many robots wait.
     """
 
     def __init__(self, max_robots: int, max_strangers: int = MAX_STRANGERS) -> None:
@@ -29,6 +32,7 @@ class Places:
         self._heard_ns: OrderedDict[str, int] = OrderedDict()
         self._strangers: OrderedDict[str, None] = OrderedDict()
         self._callers: OrderedDict[str, None] = OrderedDict()
+        self._parting: set[str] = set()
 
     def __contains__(self, robot: str) -> bool:
         return robot in self._heard_ns
@@ -42,6 +46,9 @@ class Places:
             reason = self._make_room(now_ns, waiting, word)
             if reason is not None:
                 return reason
+            if word == "token" and not self._may_part(robot):
+                return TOO_MANY_ROBOTS
+            self._parting.discard(robot)
             if word == "garbage":
                 self._strangers[robot] = None
             elif word == "token":
@@ -49,12 +56,26 @@ class Places:
         elif word == "message":
             self._callers.pop(robot, None)
             self._strangers.pop(robot, None)
-        elif word == "token" and robot in self._strangers:
+        elif word == "token" and robot in self._strangers and self._may_part(robot):
             del self._strangers[robot]
             self._callers[robot] = None
         self._heard_ns[robot] = now_ns
         self._heard_ns.move_to_end(robot)
         return None
+
+    def part(self, robot: str) -> bool:
+        """Let mail wait of a robot that has no place; False if it must not."""
+        if not self._may_part(robot):
+            return False
+        self._parting.add(robot)
+        return True
+
+    def parted(self, robot: str) -> None:
+        """No mail of the robot waits any more."""
+        self._parting.discard(robot)
+
+    def _may_part(self, robot: str) -> bool:
+        return robot in self._parting or len(self._parting) + len(self._callers) < self._max_robots
 
     def _make_room(self, now_ns: int, waiting: Container[str], word: Word) -> str | None:
         if word == "garbage" and len(self._strangers) >= self._max_strangers:
@@ -63,7 +84,10 @@ class Places:
             return None
         if word != "message" or not self._callers:
             return TOO_MANY_ROBOTS
-        self._take_out(next(iter(self._callers)))
+        caller = next(iter(self._callers))
+        self._take_out(caller)
+        if caller in waiting:
+            self._parting.add(caller)
         return None
 
     def _evict(self, robot: str, now_ns: int, waiting: Container[str]) -> bool:

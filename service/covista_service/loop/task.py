@@ -7,7 +7,7 @@ import itertools
 import logging
 import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import nullcontext, suppress
 from typing import TypeVar
@@ -82,7 +82,8 @@ class Loop:
         self._event_ids = itertools.count(next_event)
         self._clock = clock
         self._results: deque[Event] = deque()
-        self._done: list[asyncio.Future[None]] = []
+        # What somebody wants done, and who waits for it. Only the loop's own thread sees it.
+        self._wanted: list[tuple[Event, asyncio.Future[None]]] = []
         self._awake = asyncio.Event()
         self._asyncio: asyncio.AbstractEventLoop | None = None
         self._turned_ns = clock()
@@ -116,16 +117,14 @@ class Loop:
         # Before anything is taken in: a crew that cannot tell must not cost a batch.
         self._resize()
         events, self._next_ns = self._source.drain(BATCH, began_ns)
-        effects, done, self._done = list[Effect](), self._done, []
-        results = [self._results.popleft() for _ in range(len(self._results))]
-        for event in itertools.chain(results, events, (Tick(),)):
-            effects += self._receive(event)
-        self._tell(effects, [event for event in results if isinstance(event, SettingsGiven)])
-        for each in done:
-            if not each.done():
-                each.set_result(None)
+        effects, done = list[Effect](), list[tuple[Event, asyncio.Future[None]]]()
+        try:
+            for event in itertools.chain(self._reported(), self._asked(done), events, (Tick(),)):
+                effects += self._receive(event)
+        finally:
+            self._conclude(effects, done)
         self._turned_ns = self._clock()
-        return bool(self._results) or (self._next_ns is not None and self._next_ns <= began_ns)
+        return bool(self._results or self._wanted) or (self._next_ns is not None and self._next_ns <= began_ns)
 
     def wake(self) -> None:
         """Have a turn soon; from any thread, at any time."""
@@ -141,15 +140,14 @@ class Loop:
         Only in the loop's own thread. Raises TimeoutError where no turn comes; then nothing comes of the event either.
         """
         done: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        self._results.append(event)
-        self._done.append(done)
+        wanted = (event, done)
+        self._wanted.append(wanted)
         self._awake.set()
         try:
             await asyncio.wait_for(done, DO_TIMEOUT_S)
         finally:
-            # What was not taken in must not be done when nobody waits for it any more.
-            for waiting in [each for each in self._results if each is event]:
-                self._results.remove(waiting)
+            # What was not taken in must not be done when nobody waits for it any more. An equal event is another's.
+            self._wanted = [each for each in self._wanted if each is not wanted]
 
     def snapshot(self) -> Snapshot:
         """The station as it is; only in the loop's own thread."""
@@ -191,6 +189,26 @@ class Loop:
         if capacity != self._capacity:
             self._capacity = capacity
             self._station.resize(capacity)
+
+    def _reported(self) -> Iterator[Event]:
+        """What workers have found until now."""
+        for _ in range(len(self._results)):
+            yield self._results.popleft()
+
+    def _asked(self, done: list[tuple[Event, asyncio.Future[None]]]) -> Iterator[Event]:
+        """What is wanted; it is `done` then."""
+        while self._wanted:
+            done.append(self._wanted.pop(0))
+            yield done[-1][0]
+
+    def _conclude(self, effects: Sequence[Effect], done: Sequence[tuple[Event, asyncio.Future[None]]]) -> None:
+        """Tell the sinks, and whoever waits that it is done."""
+        try:
+            self._tell(effects, [event for event, _ in done if isinstance(event, SettingsGiven)])
+        finally:
+            for _, waiting in done:
+                if not waiting.done():
+                    waiting.set_result(None)
 
     def _receive(self, event: Event) -> Sequence[Effect]:
         self._count(event)
@@ -272,7 +290,12 @@ class Loop:
         live = live_settings(given[-1].options) if given else None
         news = News(self.snapshot(), events, bool(changes), robots, live, patch)
         for sink in self._sinks:
-            sink.take(news)
+            try:
+                sink.take(news)
+            except Exception:
+                # The others must hear of it all the same.
+                self._telemetry.fault("sink")
+                log.exception("a sink failed; going on", extra=about(sink=type(sink).__name__))
 
 
 def _extracted(keyframe: Keyframe, done: Future[Extraction]) -> FeaturesExtracted:

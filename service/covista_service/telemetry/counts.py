@@ -70,7 +70,7 @@ class Telemetry:
         # What has not happened yet is 0 and not absent, so that its first time shows as an increase.
         for outcome in (*Outcome, WORKER_FAILED):
             self._surveys.labels(str(outcome))
-        for where in ("loop", "station"):
+        for where in ("loop", "sink", "station"):
             self._faults.labels(where)
         for kind in _JOBS:
             self._jobs.labels(kind)

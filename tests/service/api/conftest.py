@@ -99,7 +99,7 @@ class Desk:
 
     async def _turn(self) -> None:
         while True:
-            if self.parts.loop._done:
+            if self.parts.loop._wanted:
                 self.parts.loop.turn()
             await asyncio.sleep(0)
 

@@ -367,3 +367,16 @@ def test_the_end_of_a_token_is_heard_also_of_a_robot_that_gave_its_place_away() 
     mail, _ = boxes.drain(10, NOW_NS)
     assert [(each.robot, each.tokens) for each in mail] == [("x1", {"b0": False}), ("r1", {})]
     assert boxes.turned_away == {mailbox.TOO_MANY_ROBOTS: 1}
+
+
+def test_mail_waits_of_no_more_than_twice_as_many_robots_as_there_are_places() -> None:
+    boxes = Mailboxes(max_robots=2)
+    boxes.put(letter("r1"))
+    for stranger in ("x1", "x2", "x3"):
+        boxes.token(stranger, "b0", False, 0)
+    boxes.put(letter("r2"))
+    assert boxes.depths().robots == 4
+    assert boxes.turned_away == {mailbox.TOO_MANY_ROBOTS: 1}
+    boxes.drain(10, NOW_NS)
+    boxes.token("x3", "b0", False, NOW_NS)
+    assert boxes.depths().robots == 1

@@ -61,3 +61,26 @@ def test_a_stranger_with_a_token_gives_way_likewise_and_frees_a_stranger_s_place
     assert enter(places, "x2", word="garbage") == "in"
     assert enter(places, "r1") == "in"
     assert "x1" not in places
+
+
+def test_who_calls_and_who_parts_are_together_no_more_than_there_are_places() -> None:
+    places = Places(2)
+    assert enter(places, "c1", word="token") == "in"
+    assert places.part("x1")
+    assert not places.part("x2")
+    assert enter(places, "c2", word="token") == TOO_MANY_ROBOTS
+    # Of two messages one has the free place, and the other that of the caller, which parts.
+    assert [enter(places, robot, waiting=("c1", "x1")) for robot in ("r1", "r2")] == ["in", "in"]
+    assert "c1" not in places
+    assert not places.part("x2")
+    places.parted("c1")
+    assert places.part("x2")
+
+
+def test_who_parts_and_comes_back_parts_no_more() -> None:
+    places = Places(2)
+    assert all(places.part(robot) for robot in ("x1", "x2"))
+    assert enter(places, "x1", word="token") == "in"
+    assert not places.part("x3")
+    assert enter(places, "x1") == "in"
+    assert places.part("x3")
