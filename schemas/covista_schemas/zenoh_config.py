@@ -21,8 +21,9 @@ MAX_MESSAGE_BYTES = 4 * 1024 * 1024
 MAX_REPLY_BYTES = MAX_MESSAGE_BYTES - 16 * 1024
 # A dead link is noticed after some 1.6 s, not 10 s.
 LEASE_MS = 2000
-# How often a router that does not answer is tried: soon at first, once a second in the end.
-RETRY = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
+# How often a router that does not answer is tried: soon at first, and every .4 s in the end. Whoever has waited for a
+# station to start should not wait for another second.
+RETRY = {"period_init_ms": 100, "period_max_ms": 400, "period_increase_factor": 2}
 # How a robot sends, whose link may be slow. A pose comes after all that waits in the kernel or is being written: so
 # little waits there, pictures go out in small pieces, and there is room for poses that wait for one of those. At
 # 120 kbit/s two thirds of the poses were lost without this, and the others came up to 10 s late; with it they come 1 to

@@ -46,6 +46,12 @@ def test_a_new_database_has_the_tables_that_the_station_knows(engine: Engine) ->
     assert differences(engine) == []
 
 
+def test_the_newest_version_is_the_one_that_a_new_database_gets(engine: Engine) -> None:
+    with engine.begin() as connection:
+        upgrade(connection)
+        assert connection.execute(text("select version_num from alembic_version")).scalar_one() == migrations.NEWEST
+
+
 def test_a_database_of_the_first_version_is_upgraded_and_keeps_what_it_has(engine: Engine) -> None:
     make_first(engine)
     for _ in range(2):
