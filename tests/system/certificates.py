@@ -3,6 +3,7 @@
 import os
 import subprocess
 from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from covista_schemas.zenoh_tls import Tls
@@ -15,6 +16,20 @@ extendedKeyUsage = {usage}
 subjectAltName = DNS:{name},DNS:localhost,IP:127.0.0.1
 subjectKeyIdentifier = hash
 authorityKeyIdentifier = keyid
+"""
+_BOOKS = """
+[ca]
+default_ca = books
+[books]
+database = {books}/index
+serial = {books}/serial
+new_certs_dir = {books}
+default_md = sha256
+policy = names
+x509_extensions = extensions
+[names]
+commonName = supplied
+[extensions]
 """
 
 
@@ -76,6 +91,21 @@ def sign(folder: Path, name: str, *, days: int = 1, usage: str | None = "clientA
     signed = ("-CA", tls.ca, "-CAkey", folder / "ca.key", "-set_serial", "7", "-days", str(days), "-out", cert)
     _openssl("x509", "-req", "-in", request, "-sha256", *signed, *extensions)
     return Tls(tls.ca, cert, key)
+
+
+def sign_for(folder: Path, name: str, seconds: int) -> Tls:
+    """A certificate that is over after so many seconds, for which OpenSSL wants an authority with books."""
+    tls, books = tls_of(folder, name), folder / "books"
+    books.mkdir()
+    (books / "index").touch()
+    (books / "serial").write_text("07\n")
+    (folder / "short.cnf").write_text(_BOOKS.format(books=books) + _EXTENSIONS.format(usage="clientAuth", name=name))
+    _openssl("req", "-new", "-key", tls.key, "-subj", f"/CN={name}", "-out", folder / "short.csr")
+    now = datetime.now(UTC)
+    start, end = (f"{at:%y%m%d%H%M%SZ}" for at in (now - timedelta(hours=1), now + timedelta(seconds=seconds)))
+    signed = ("-cert", tls.ca, "-keyfile", folder / "ca.key", "-in", folder / "short.csr", "-out", folder / "short.pem")
+    _openssl("ca", "-batch", "-notext", "-config", folder / "short.cnf", *signed, "-startdate", start, "-enddate", end)
+    return Tls(tls.ca, folder / "short.pem", tls.key)
 
 
 def _openssl(*words: str | Path) -> None:

@@ -30,12 +30,12 @@ def test_a_router_that_is_killed(field: Field, books: Books, record: Record, run
     used = {robot: report["keyframes"]["used"] for robot, report in field.robots().items()}
     field.crash("router")
 
-    def goes_on() -> bool:
+    def fresh() -> bool:
         known = field.robots()
-        fresh = all(known[robot]["keyframes"]["used"] > used[robot] + 1 for robot in used)
-        return fresh and field.at_work()
+        newer = all(known[robot]["keyframes"]["used"] > used[robot] + 1 for robot in used)
+        return newer and field.at_work()
 
-    resumed_s = field.until(goes_on, 60, "new keyframes of everybody")
+    resumed_s = field.until(fresh, 60, "new keyframes of everybody")
     missing = books.close()
     record.add(
         Row("router killed", "groups as they were", {}, resumed_s, f"{max(missing.values())} keyframes a rover at most")
