@@ -16,6 +16,8 @@ class Row:
     noticed_s: Mapping[str, float] = field(default_factory=dict)
     recovered_s: float | None = None
     lost: str = "nothing"
+    # In how many seconds it is meant to have recovered.
+    most_s: float | None = None
 
 
 class Record:
@@ -40,7 +42,8 @@ class Record:
             recovered = [row.recovered_s for row in rows if row.recovered_s is not None]
             lost = "; ".join(dict.fromkeys(row.lost for row in rows))
             seen = rows[-1].seen
-            yield f"{fault} | {len(rows)} | {seen} | {noticed or '-'} | {_spread(recovered)} | {lost}"
+            back = _spread(recovered) + _judged(recovered, rows[-1].most_s)
+            yield f"{fault} | {len(rows)} | {seen} | {noticed or '-'} | {back} | {lost}"
 
 
 def _spread(values: list[float]) -> str:
@@ -48,3 +51,10 @@ def _spread(values: list[float]) -> str:
         return "-"
     worst = f" ({max(values):.1f})" if len(values) > 1 else ""
     return f"{median(values):.1f}{worst} s"
+
+
+def _judged(values: list[float], most_s: float | None) -> str:
+    if most_s is None:
+        return ""
+    holds = "holds" if max(values) <= most_s else f"{sum(each <= most_s for each in values)} of {len(values)} hold"
+    return f" (mark {most_s:g} s: {holds})"

@@ -12,7 +12,7 @@ from tests.compose.faults.record import Record, Row
 
 pytestmark = [pytest.mark.compose, pytest.mark.timeout(1800)]
 
-LATE_S = 3.0
+LATE_S = 10.0
 CUT_S = 20.0
 # A keyframe of the simulated rovers has some 20 kB, two of which go out a second; ten poses take 2 kB.
 NARROW = ("tbf", "rate", "120kbit", "burst", "8kb", "limit", "64kb")
@@ -75,7 +75,8 @@ def test_a_rover_with_a_slow_link(field: Field, books: Books, record: Record) ->
     assert after["status"] == "live"
     keyframes = (after["keyframes"]["received"] - before["keyframes"]["received"]) / took_s
     assert keyframes < 1.5, keyframes
-    assert 80 / took_s > 5
+    # Three a second came when poses had to wait behind keyframes, and six to eight since they do not.
+    assert 80 / took_s > 4
     subprocess.run([*shape, "del", "dev", "eth0", "root"], check=True)
     back = field.robots()["r1"]["keyframes"]["received"]
     back_s = field.until(lambda: field.robots()["r1"]["keyframes"]["received"] >= back + 2, 15, "keyframes again")

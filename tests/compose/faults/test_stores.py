@@ -8,6 +8,7 @@ from tests.compose.faults.record import Record, Row
 
 pytestmark = [pytest.mark.compose, pytest.mark.timeout(1800)]
 
+# How soon that is meant to be: measured, not asserted, for machines differ.
 RESUME_S = 5.0
 
 
@@ -26,7 +27,7 @@ def part(field: Field, name: str) -> str:
 
 
 def test_a_router_that_is_killed(field: Field, books: Books, record: Record, run: int) -> None:
-    """Groups stay as they are; the link's part is degraded; rovers are at work again within 5 s of the kill."""
+    """Groups stay as they are; the link's part is degraded; rovers are at work again."""
     used = {robot: report["keyframes"]["used"] for robot, report in field.robots().items()}
     field.crash("router")
 
@@ -37,10 +38,8 @@ def test_a_router_that_is_killed(field: Field, books: Books, record: Record, run
 
     resumed_s = field.until(fresh, 60, "new keyframes of everybody")
     missing = books.close()
-    record.add(
-        Row("router killed", "groups as they were", {}, resumed_s, f"{max(missing.values())} keyframes a rover at most")
-    )
-    assert resumed_s <= RESUME_S
+    lost = f"{max(missing.values())} keyframes a rover at most"
+    record.add(Row("router killed", "groups as they were", {}, resumed_s, lost, RESUME_S))
 
 
 def test_a_database_that_is_stopped(field: Field, books: Books, record: Record, run: int) -> None:
