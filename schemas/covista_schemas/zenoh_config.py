@@ -24,16 +24,8 @@ LEASE_MS = 2000
 # How often a router that does not answer is tried: soon at first, and every .4 s in the end. Whoever has waited for a
 # station to start should not wait for another second.
 RETRY = {"period_init_ms": 100, "period_max_ms": 400, "period_increase_factor": 2}
-# How a robot sends, whose link may be slow. A pose comes after all that waits in the kernel or is being written: so
-# little waits there, pictures go out in small pieces, and there is room for poses that wait for one of those. At
-# 120 kbit/s two thirds of the poses were lost without this, and the others came up to 10 s late; with it they come 1 to
-# 5 s late. An end point may say otherwise (#so_sndbuf=262144): of 10 kB at a time, a long round trip carries few.
-NARROW: dict[str, object] = {
-    "transport/link/tcp/so_sndbuf": 8192,
-    "transport/link/tls/so_sndbuf": 8192,
-    "transport/link/tx/batch_size": 4096,
-    "transport/link/tx/queue/size/interactive_high": 16,
-}
+# So many poses may wait while something large is written to a slow link; each waits by itself.
+POSES_WAITING = 16
 _INTERNET = re.compile(r"(?:tcp|udp|tls|quic|ws)/(?:\[[0-9a-fA-F:.]+\]|[^\s/:\[\]]+):(?P<port>\d{1,5})(?:[?#]\S*)?")
 _OWN_TLS = re.compile("certificate|private_key|mtls|verify_name")
 # Options of an end point that cannot weaken its certificates: on which interface, and the socket's.
@@ -82,12 +74,10 @@ def config(
     listen: Sequence[str] = (),
     timeout_ms: int = 1000,
     tls: Tls | None = None,
-    narrow: bool = False,
 ) -> zenoh.Config:
     """Configuration of a session; `connect` and `listen` are end points such as tcp/127.0.0.1:7447.
 
-    A client that finds no router within `timeout_ms` fails to open. `narrow` is for who sends over a link that may be
-    slow: what is urgent does not wait behind what is large. With `tls` both sides of a link prove who they are,
+    A client that finds no router within `timeout_ms` fails to open. With `tls` both sides of a link prove who they are,
     and no end point may be a plain one. Raises LinkError for end points that cannot be.
     """
     for endpoint in (*connect, *listen):
@@ -111,8 +101,8 @@ def config(
     }
     if tls is not None:
         values["transport/link/tls"] = _mutual(tls)
-    if narrow:
-        values |= NARROW
+    if mode == "client":
+        values["transport/link/tx/queue/size/interactive_high"] = POSES_WAITING
     for key, value in values.items():
         try:
             made.insert_json5(key, json.dumps(value))

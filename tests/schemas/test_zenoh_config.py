@@ -1,9 +1,6 @@
-import json
-from pathlib import Path
-
 import pytest
 from covista_schemas.errors import LinkError
-from covista_schemas.zenoh_config import NARROW, check_endpoint, config
+from covista_schemas.zenoh_config import check_endpoint, config
 from covista_schemas.zenoh_tls import Tls
 
 GOOD = [
@@ -63,12 +60,3 @@ def test_what_cannot_be_an_end_point_is_refused_in_one_line(endpoint: str) -> No
     with pytest.raises(LinkError, match="not an end point such as") as caught:
         config("client", connect=[endpoint])
     assert len(str(caught.value).splitlines()) == 1
-
-
-def test_a_narrow_link_keeps_little_on_its_way_with_certificates_too() -> None:
-    files = Tls(*(Path(f"/absent/{name}.pem") for name in ("ca", "cert", "key")))
-    made = config("client", connect=["tls/h:1"], tls=files, narrow=True)
-    assert {key: json.loads(made.get_json(key)) for key in NARROW} == NARROW
-    assert json.loads(made.get_json("transport/link/tls/root_ca_certificate")) == "/absent/ca.pem"
-    wide = config("client", connect=["tcp/h:1"])
-    assert all(json.loads(wide.get_json(key)) != value for key, value in NARROW.items())

@@ -27,6 +27,9 @@ _PAUSE_S = 0.1
 # After so long it is told that nobody answers, or listens, and what it may be.
 PATIENCE_S = 5.0
 _ASK_EVERY_S = 0.03
+_LOOK_EVERY_S, _GLANCE_S = 0.1, 0.01
+# One station answers, and zenoh that the time is over.
+_ANSWERS = 4
 # After a router came back all its rovers ask at once: they ask again at different times.
 _ASK_AGAIN_S = (0.03, 0.2)
 # So many changes of the link are kept until somebody looks; the newest tell enough.
@@ -47,7 +50,7 @@ def open_with_retry(endpoint: str, stop: threading.Event, tls: Tls | None = None
     told_s = time.monotonic() + PATIENCE_S
     while not stop.is_set():
         try:
-            return zenoh.open(config("client", connect=[endpoint], timeout_ms=OPEN_TIMEOUT_MS, tls=tls, narrow=True))
+            return zenoh.open(config("client", connect=[endpoint], timeout_ms=OPEN_TIMEOUT_MS, tls=tls))
         except zenoh.ZError as error:
             logger.debug("no router at %s yet: %s", endpoint, error)
         if time.monotonic() >= told_s:
@@ -204,6 +207,35 @@ class RoverLink:
             if report is not None and has_heard(report, KeyframeId(boot=self._boot, sequence=last)):
                 return True
             pause.wait(min(_ASK_EVERY_S, left_s))
+        return False
+
+    def let_through(self, sequence: int, within_s: float, go_on: Callable[[], bool]) -> bool:
+        """Wait for as long as the station answers that it has not heard of keyframe `sequence` of this boot yet.
+
+        False where it has not in so long; where nobody answers there is nothing to wait for. `go_on` is asked all the
+        while. Raises LinkError where the answer cannot be read.
+        """
+        pause, deadline_s = threading.Event(), time.monotonic() + within_s
+        while go_on() and (left_s := deadline_s - time.monotonic()) > 0:
+            answers: zenoh.handlers.FifoChannel[zenoh.Reply] = zenoh.handlers.FifoChannel(_ANSWERS)
+            replies = self._session.get(keys.robot_report(self._site, self._robot), answers, timeout=left_s)
+            answered = False
+            while go_on():
+                try:
+                    reply = replies.try_recv()
+                except zenoh.ZError:
+                    # All have answered, or the time is over.
+                    break
+                if reply is None:
+                    pause.wait(_GLANCE_S)
+                    continue
+                answered = True
+                keyframe = KeyframeId(boot=self._boot, sequence=sequence)
+                if reply.ok is not None and has_heard(_read_report(self._robot, reply.ok), keyframe):
+                    return True
+            if not answered and time.monotonic() < deadline_s:
+                return go_on()
+            pause.wait(min(_LOOK_EVERY_S, left_s))
         return False
 
     def close(self) -> None:

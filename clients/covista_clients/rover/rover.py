@@ -41,6 +41,9 @@ _LOOK_EVERY_S = 0.05
 _LOOK_BACK_EVERY_S = 0.5
 # How long the station may take to say what it heard before.
 _HEAR_BACK_S = 1.0
+# Of every so many keyframes it is asked whether the station has heard them; waited for at most so long; and where that
+# takes longer than this, the link is slow.
+_PROBE_EVERY, _UNHEARD_S, _SLOW_S = 4, 5.0, 0.5
 
 
 class Rover:
@@ -88,6 +91,7 @@ class Rover:
             self._check_way()
         self._unheard_s: float | None = None
         self._wondered = False
+        self._slow = False
         self._token = liveliness
         self._outbox: Outbox[tuple[Pose, Callable[[], Content]]] = Outbox()
         self._stop = threading.Event()
@@ -227,6 +231,7 @@ class Rover:
             taken = self._outbox.take(partial(self._may_send, link), self._patience_s(held))
             if taken is not None:
                 self._send_keyframe(link, *taken)
+                self._let_through(link, taken[0])
             elif held or self._outbox.waits or self._in_doubt:
                 self._wonder(link.keyframes_wanted())
                 self._stop.wait(_LOOK_EVERY_S)
@@ -285,6 +290,21 @@ class Rover:
             self.keyframes_sent += 1
             self._last_sent = sequence
             self._last_words.keyframe_sent(sequence, data)
+
+    def _let_through(self, link: RoverLink, sequence: int) -> None:
+        """On a slow link one keyframe is under way at a time: what is put into buffers delays poses by many seconds.
+
+        Whether it is slow, every few keyframes tell. Meanwhile the newest keyframe replaces the one that waits.
+        """
+        if not self._slow and sequence % _PROBE_EVERY:
+            return
+        begun_s = time.monotonic()
+        try:
+            heard = link.let_through(sequence, _UNHEARD_S, lambda: not self._closing and not self._doubts(link))
+        except (LinkError, zenoh.ZError):
+            logger.exception("%s could not find out whether the station hears it", self.robot)
+            return
+        self._slow = not heard or time.monotonic() - begun_s > _SLOW_S
 
     def _flush_pose(self) -> None:
         """Send the pose that waits, if a station listens; call with `_pose_news` held."""

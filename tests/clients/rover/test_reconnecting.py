@@ -99,16 +99,17 @@ def test_a_newer_keyframe_that_waits_goes_in_place_of_the_old_one(
     endpoint: str, router: RouterProcess, station: Ground
 ) -> None:
     with Rover("r1", CAMERA, endpoint) as rover:
-        send(rover, 0)
-        station.wait(lambda: sequences(station) == ([0], [0]))
+        # The second goes out when the rover knows that the first was heard: it waits for no more news of the link.
+        send(rover, 0, 1)
+        station.wait(lambda: sequences(station) == ([0, 1], [0, 1]))
         router.stop()
-        send(rover, 1, 2)
+        send(rover, 2, 3)
         router.kill()
         wait_until(lambda: not rover._link.keyframes_wanted())
-        rover.send_keyframe(PICTURE, at(3))
-        rover.send_pose(at(3))
+        rover.send_keyframe(PICTURE, at(4))
+        rover.send_pose(at(4))
         router.start()
-        station.wait(lambda: sequences(station) == ([0, 3], [0, 3]))
+        station.wait(lambda: sequences(station) == ([0, 1, 4], [0, 1, 4]))
         assert (rover.keyframes_resent, rover.poses_resent, rover.keyframes_lost) == (0, 0, 2)
 
 
