@@ -75,6 +75,7 @@ def test_a_rover_with_a_slow_link(field: Field, books: Books, record: Record) ->
     assert after["status"] == "live"
     keyframes = (after["keyframes"]["received"] - before["keyframes"]["received"]) / took_s
     assert keyframes < 1.5, keyframes
+    assert 80 / took_s > 5
     subprocess.run([*shape, "del", "dev", "eth0", "root"], check=True)
     back = field.robots()["r1"]["keyframes"]["received"]
     back_s = field.until(lambda: field.robots()["r1"]["keyframes"]["received"] >= back + 2, 15, "keyframes again")
