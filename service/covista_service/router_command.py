@@ -115,7 +115,11 @@ def open_router(settings: Settings) -> Switchboard:
     open_for = opening(settings.link, settings.connect, settings.site, lock)
     switchboard = Switchboard(open_for, lock, waits=not settings.link, alive=alive.robots)
     if lock is not None:
-        switchboard.plug(alive.join)
+        try:
+            switchboard.plug(alive.join)
+        except BaseException:
+            switchboard.close()
+            raise
     return switchboard
 
 

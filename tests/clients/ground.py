@@ -33,6 +33,10 @@ def report_on(robot: str, **known: object) -> RobotReport:
     return RobotReport.model_validate({"id": robot, "status": Status.LIVE, **nothing, **counters, **known})
 
 
+class BusyError(Exception):
+    """What an answer may raise: too many ask the station."""
+
+
 class Ground:
     """Hears everything that robots say, and confirms keyframes unless told otherwise."""
 
@@ -116,12 +120,16 @@ class Ground:
 
     def _hear_query(self, query: zenoh.Query) -> None:
         key = str(query.key_expr)
+        problem = '{"title": "Unknown robot", "status": 404}'
         with self._news:
             self.asked += 1
-            report = self._answer(key.rsplit("/", 1)[1])
+            try:
+                report = self._answer(key.rsplit("/", 1)[1])
+            except BusyError:
+                report, problem = None, '{"title": "Too many ask", "status": 503}'
             self._news.notify_all()
         with query:
             if report is not None:
                 query.reply(key, report.model_dump_json())
             else:
-                query.reply_err('{"title": "Unknown robot", "status": 404}')
+                query.reply_err(problem)

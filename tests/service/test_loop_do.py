@@ -161,14 +161,15 @@ def test_mail_that_cannot_be_opened_leaves_nobody_waiting_for_what_was_done() ->
     assert [news.patch for news in desk.notebook.news] == [{"text": "a"}]
 
 
-def test_news_that_cannot_be_made_leaves_nobody_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_news_that_cannot_be_made_is_told_to_who_waits(monkeypatch: pytest.MonkeyPatch) -> None:
     async def scenario() -> None:
         (task,) = await begun(desk, given("a"))
         with monkeypatch.context() as bug:
             bug.setattr(desk.station, "snapshot", lambda now_ns: 1 / 0)
             with pytest.raises(ZeroDivisionError):
                 desk.loop.turn()
-        await task
+        with pytest.raises(ZeroDivisionError):
+            await task
 
     desk = Desk()
     through(scenario)

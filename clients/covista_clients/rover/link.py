@@ -27,7 +27,8 @@ _PAUSE_S = 0.1
 # After so long it is told that nobody answers, or listens, and what it may be.
 PATIENCE_S = 5.0
 _ASK_EVERY_S = 0.03
-_LOOK_EVERY_S, _GLANCE_S = 0.1, 0.01
+# Between two questions whether a keyframe was heard: at first, and at most. How often it is looked for an answer.
+_PAUSES_S, _GLANCE_S = (0.1, 1.0), 0.01
 # One station answers, and zenoh that the time is over.
 _ANSWERS = 4
 # After a router came back all its rovers ask at once: they ask again at different times.
@@ -116,6 +117,7 @@ class RoverLink:
         self._site, self._robot, self._boot = site, robot, boot
         self._owned = owned
         self._closed = False
+        self._way_s = float("inf")
         # Keyframes give way to poses, and a congested link drops them at the source instead of holding up the robot.
         self._keyframes = session.declare_publisher(
             keys.keyframe(site, robot),
@@ -209,34 +211,46 @@ class RoverLink:
             pause.wait(min(_ASK_EVERY_S, left_s))
         return False
 
-    def let_through(self, sequence: int, within_s: float, go_on: Callable[[], bool]) -> bool:
-        """Wait for as long as the station answers that it has not heard of keyframe `sequence` of this boot yet.
+    def delay_s(self, sequence: int, within_s: float, go_on: Callable[[], bool]) -> float | None:
+        """How much longer keyframe `sequence` of this boot, just put, is on its way than a question and its answer.
 
-        False where it has not in so long; where nobody answers there is nothing to wait for. `go_on` is asked all the
-        while. Raises LinkError where the answer cannot be read.
+        Asks until the station has heard of it; infinite where it has not in so long. None where that cannot be found
+        out: nobody answers, the station is too busy, or `go_on`, which is asked all the while, says no. Raises
+        LinkError where the answer cannot be read.
         """
-        pause, deadline_s = threading.Event(), time.monotonic() + within_s
-        while go_on() and (left_s := deadline_s - time.monotonic()) > 0:
-            answers: zenoh.handlers.FifoChannel[zenoh.Reply] = zenoh.handlers.FifoChannel(_ANSWERS)
-            replies = self._session.get(keys.robot_report(self._site, self._robot), answers, timeout=left_s)
-            answered = False
-            while go_on():
-                try:
-                    reply = replies.try_recv()
-                except zenoh.ZError:
-                    # All have answered, or the time is over.
-                    break
-                if reply is None:
-                    pause.wait(_GLANCE_S)
-                    continue
-                answered = True
-                keyframe = KeyframeId(boot=self._boot, sequence=sequence)
-                if reply.ok is not None and has_heard(_read_report(self._robot, reply.ok), keyframe):
-                    return True
-            if not answered and time.monotonic() < deadline_s:
-                return go_on()
-            pause.wait(min(_LOOK_EVERY_S, left_s))
-        return False
+        begun_s, keyframe = time.monotonic(), KeyframeId(boot=self._boot, sequence=sequence)
+        asked, pause_s = 0, _PAUSES_S[0]
+        while go_on() and (left_s := begun_s + within_s - time.monotonic()) > 0:
+            asked_s = time.monotonic()
+            answered, report = self._ask(left_s, go_on)
+            if not answered:
+                break
+            # The way of a question was never shorter than when there was nothing before it.
+            self._way_s, asked = min(self._way_s, time.monotonic() - asked_s), asked + 1
+            if report is not None and has_heard(report, keyframe):
+                return time.monotonic() - begun_s - asked * self._way_s
+            threading.Event().wait(min(random.uniform(0.5, 1.0) * pause_s, left_s))
+            pause_s = min(2 * pause_s, _PAUSES_S[1])
+        return None if time.monotonic() < begun_s + within_s else float("inf")
+
+    def _ask(self, within_s: float, go_on: Callable[[], bool]) -> tuple[bool, RobotReport | None]:
+        """Whether the station says what it knows of this robot, and that: None where it knows of no such robot."""
+        pause = threading.Event()
+        answers: zenoh.handlers.FifoChannel[zenoh.Reply] = zenoh.handlers.FifoChannel(_ANSWERS)
+        replies = self._session.get(keys.robot_report(self._site, self._robot), answers, timeout=within_s)
+        while go_on():
+            try:
+                reply = replies.try_recv()
+            except zenoh.ZError:
+                # All have answered, or the time is over.
+                break
+            if reply is None:
+                pause.wait(_GLANCE_S)
+            elif reply.ok is not None:
+                return True, _read_report(self._robot, reply.ok)
+            elif reply.err is not None and _is_unknown(reply.err):
+                return True, None
+        return False, None
 
     def close(self) -> None:
         """Take everything back."""

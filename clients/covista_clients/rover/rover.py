@@ -41,8 +41,8 @@ _LOOK_EVERY_S = 0.05
 _LOOK_BACK_EVERY_S = 0.5
 # How long the station may take to say what it heard before.
 _HEAR_BACK_S = 1.0
-# Of every so many keyframes it is asked whether the station has heard them; waited for at most so long; and where that
-# takes longer than this, the link is slow.
+# Of every so many keyframes it is asked whether the station has heard them; waited for at most so long; and where it
+# takes so much longer than a question, the link is slow.
 _PROBE_EVERY, _UNHEARD_S, _SLOW_S = 4, 5.0, 0.5
 
 
@@ -298,13 +298,13 @@ class Rover:
         """
         if not self._slow and sequence % _PROBE_EVERY:
             return
-        begun_s = time.monotonic()
         try:
-            heard = link.let_through(sequence, _UNHEARD_S, lambda: not self._closing and not self._doubts(link))
-        except (LinkError, zenoh.ZError):
-            logger.exception("%s could not find out whether the station hears it", self.robot)
+            delay_s = link.delay_s(sequence, _UNHEARD_S, lambda: not self._closing and not self._doubts(link))
+        except (LinkError, zenoh.ZError) as error:
+            logger.debug("%s could not find out whether the station hears it: %s", self.robot, error)
             return
-        self._slow = not heard or time.monotonic() - begun_s > _SLOW_S
+        if delay_s is not None:
+            self._slow = delay_s > _SLOW_S
 
     def _flush_pose(self) -> None:
         """Send the pose that waits, if a station listens; call with `_pose_news` held."""

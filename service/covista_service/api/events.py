@@ -61,8 +61,9 @@ async def events(parts: PartsNow, last_id: LastIdHeader = None, last_event_id: L
     far as the history has it, with no hole and no repeat. Two kinds are of the stream itself. `reset` says that the
     events from `first` to `last`, as far as there were any, cannot be given again; what follows is complete. `cut` is
     the last word of a stream that the station ends: `data` is a Problem that says why (the station stops, the client
-    reads too slowly, has listened for an hour, or its token was revoked), and who asks again with the id of the last
-    event misses nothing. A comment comes where nothing else did for 15 s. At most 256 listen at a time.
+    reads too slowly, has listened for an hour, or may not listen any more, for its token was revoked or the first one
+    was made), and who asks again with the id of the last event misses nothing. A comment comes where nothing else did
+    for 15 s. At most 256 listen at a time.
     """
     return Listening(parts.stream, parts.archive, parts.readers, last_event_id if last_id is None else last_id)
 

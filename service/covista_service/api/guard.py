@@ -84,7 +84,7 @@ def guarded(app: ASGIApp) -> ASGIApp:
 
 
 def _while_let_in(scope: Request, by: str | None, send: Send) -> Send:
-    """Sends until the token is revoked: a stream of events would outlive it by days."""
+    """Sends until the token is revoked, or the first one made: a stream of events would outlive that by days."""
     keyring = _gate_of(scope).keyring
     over = is_stream = False
 
@@ -96,18 +96,18 @@ def _while_let_in(scope: Request, by: str | None, send: Send) -> Send:
             is_stream = Headers(raw=message["headers"]).get("content-type", "").startswith(EVENT_STREAM)
         elif not keyring.lets_in(by):
             over = True
-            await _cut(scope, send, is_stream)
+            await _cut(scope, send, Refusal.MISSING if by is None else Refusal.REVOKED, is_stream)
             return
         await send(message)
 
     return sending
 
 
-async def _cut(scope: Request, send: Send, is_stream: bool) -> None:
+async def _cut(scope: Request, send: Send, reason: Refusal, is_stream: bool) -> None:
     """End an answer short, so that nobody takes it for whole; a stream has a last word for that."""
     extensions: dict[str, Any] = scope.get("extensions") or {}
     if is_stream:
-        status, detail, _ = _WHY[Refusal.REVOKED]
+        status, detail, _ = _WHY[reason]
         farewell = encode(CUT_EVENT, Problem(title=status.phrase, status=status, detail=detail))
         await send({"type": "http.response.body", "body": farewell, "more_body": False})
     elif CUT in extensions:

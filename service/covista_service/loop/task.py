@@ -202,13 +202,16 @@ class Loop:
             yield done[-1][0]
 
     def _conclude(self, effects: Sequence[Effect], done: Sequence[tuple[Event, asyncio.Future[None]]]) -> None:
-        """Tell the sinks, and whoever waits that it is done."""
+        """Tell the sinks, and whoever waits that it is done: or that nobody was told of it."""
+        waiting = [each for _, each in done if not each.done()]
         try:
             self._tell(effects, [event for event, _ in done if isinstance(event, SettingsGiven)])
-        finally:
-            for _, waiting in done:
-                if not waiting.done():
-                    waiting.set_result(None)
+        except Exception as error:
+            for each in waiting:
+                each.set_exception(error)
+            raise
+        for each in waiting:
+            each.set_result(None)
 
     def _receive(self, event: Event) -> Sequence[Effect]:
         self._count(event)

@@ -10,6 +10,7 @@ import pytest
 import zenoh
 from covista_clients import Camera, Features, Pose, Rover
 from covista_clients.rover import rover as rover_module
+from covista_clients.rover.link import RoverLink
 from covista_schemas import codec, keys
 from covista_schemas.errors import LinkError
 from covista_schemas.reports import KeyframeId, OwnGroupReport, RobotReport
@@ -99,8 +100,10 @@ def test_closing_loses_nothing(endpoint: str, ground: Ground) -> None:
     ground.wait(lambda: len(ground.poses) == 5)
 
 
-def test_closing_waits_for_the_last_keyframe_to_be_confirmed(endpoint: str) -> None:
+def test_closing_waits_for_the_last_keyframe_to_be_confirmed(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Not for an older one, nor for one of another boot."""
+    # What is asked before, since the link may be slow, would have some of the answers.
+    monkeypatch.setattr(RoverLink, "delay_s", lambda *_: None)
     boot = "this"
     answers = [None, ("other", 7), (boot, 0), (boot, 1)]
     given: list[object] = []
@@ -257,6 +260,7 @@ def wait_until(condition: object) -> None:
 
 UNCLOSED = """
 import sys, threading
+from covista_clients.rover.link import RoverLink
 from covista_clients import Camera, Rover
 
 rover = Rover("r1", Camera(fx=60, fy=60, cx=31.5, cy=23.5, width=64, height=48), sys.argv[1])

@@ -11,7 +11,7 @@ from tests.compose.faults.field import ROVERS, TOPICS, Field, check_sums, deploy
 from tests.compose.faults.record import Record
 
 RUNS = int(os.environ.get("COVISTA_FAULT_RUNS", "1"))
-SETTLED_S = 5.0
+SETTLED_S = 20.0
 kept = pytest.StashKey[Record]()
 
 

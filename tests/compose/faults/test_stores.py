@@ -19,7 +19,7 @@ def behind() -> bool:
 
 def goes_on(field: Field) -> None:
     """The swarm is at work, but for a moment in which the machine is busy with the fault itself."""
-    field.until(field.at_work, 5, "the swarm at work all the same")
+    field.until(field.at_work, 30, "the swarm at work all the same")
 
 
 def part(field: Field, name: str) -> str:

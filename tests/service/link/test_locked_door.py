@@ -371,7 +371,7 @@ def test_without_a_certificate_of_the_authority_nobody_connects(
 
 def test_what_the_expired_certificate_was_is_let_in(scene: Scene, certs: Path) -> None:
     # Made as those above that are refused are, but for the days.
-    with zenoh.open(config("client", connect=[scene.endpoint], tls=sign(certs, "r1", days=1), timeout_ms=1000)) as r1:
+    with zenoh.open(config("client", connect=[scene.endpoint], tls=sign(certs, "r1", days=1), timeout_ms=5000)) as r1:
         assert r1.info.routers_zid()
 
 
