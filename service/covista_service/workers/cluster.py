@@ -10,7 +10,7 @@ import time
 from concurrent.futures import Future
 from contextlib import suppress
 from importlib.metadata import version
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from covista_service.loop import CrewStatus
 from covista_service.workers.connection import Connection, OverdueError, Post, PostLostError, unlike
@@ -105,6 +105,7 @@ class Cluster:
 
     async def _until_closed(self) -> None:
         self._asyncio = asyncio.get_running_loop()
+        self._asyncio.set_exception_handler(_left_behind)
         self._main = asyncio.create_task(self._keep())
         self._begun.set()
         await self._main
@@ -211,6 +212,15 @@ class Cluster:
             # Each that comes meanwhile waits for the same one.
             self._aside = Processes(1, deadline_s=self._deadline_s, tally=self._tally)
         return await asyncio.wrap_future(self._aside.submit(job))
+
+
+def _left_behind(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """What nobody waits for any more: of a connection that is lost, Dask leaves tasks behind that end by exceptions."""
+    error = context.get("exception")
+    if error is not None and type(error).__module__.partition(".")[0] == "distributed":
+        log.debug("left behind by Dask: %r", error)
+    else:
+        loop.default_exception_handler(context)
 
 
 def _why(error: Exception) -> str:

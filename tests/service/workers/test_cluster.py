@@ -1,3 +1,5 @@
+import asyncio
+import logging
 import os
 import signal
 import socket
@@ -7,9 +9,10 @@ from pathlib import Path
 
 import pytest
 from covista_service.workers import JobLostError, load
-from covista_service.workers.cluster import Cluster
+from covista_service.workers.cluster import Cluster, _left_behind
 from covista_service.workers.connection import unlike
 from covista_service.workers.jobs import Job
+from distributed.client import AllExit
 
 from tests.service.deadline import free_endpoint, wait_until
 from tests.service.workers.dask_cluster import DaskCluster, dask_cluster
@@ -153,3 +156,14 @@ def test_software_that_differs_is_named() -> None:
     assert unlike(version("covista")) is None
     assert unlike("0.0.1") == f"has covista 0.0.1, not {version('covista')}"
     assert unlike(ModuleNotFoundError()) == "has no covista"
+
+
+def test_what_dask_leaves_behind_is_no_error_and_all_else_is(caplog: pytest.LogCaptureFixture) -> None:
+    loop = asyncio.new_event_loop()
+    try:
+        for error, said in ((AllExit(), []), (ValueError("ours"), ["left by us"])):
+            caplog.clear()
+            _left_behind(loop, {"message": "left by us", "exception": error})
+            assert [record.getMessage() for record in caplog.records if record.levelno >= logging.ERROR] == said
+    finally:
+        loop.close()
