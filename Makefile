@@ -63,7 +63,7 @@ up: ## Station and rovers as containers, in the background
 	@BASE_IMAGE=$$(docker/base.sh) && export BASE_IMAGE && $(STACK) build --quiet
 	@echo "up: starting station and rovers"
 	@said=$$($(STACK) up --detach 2>&1) || { echo "$$said"; case "$$said" in (*"already allocated"*|*"already in use"*) \
-		echo "A port is taken, say another: COVISTA_API_AT=127.0.0.1:8001 COVISTA_LINK_AT=127.0.0.1:7448 make up";; esac; exit 1; }
+		echo "A port is taken, say another: COVISTA_API_AT=127.0.0.1:8001 COVISTA_LINK_AT=127.0.0.1:7449 make up; make down removes what has started";; esac; exit 1; }
 	@echo "The station answers at http://$$($(STACK) port station 8000)/api/v1/groups; rovers reach it at tcp/$$($(STACK) port station 7447)."
 	@echo "make down ends all; the history stays in the volume $(COMPOSE_PROJECT_NAME)_history."
 

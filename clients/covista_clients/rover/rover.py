@@ -167,7 +167,8 @@ class Rover:
         try:
             if wait_s != 0 and not (self._drain(deadline_s) and self._confirm(deadline_s)):
                 logger.warning(
-                    "%s leaves without the station's confirmation of all it had to say; is the station still starting?",
+                    "%s leaves without the station's confirmation of all it had to say; is it still starting, or "
+                    "does it refuse this robot?",
                     self.robot,
                 )
         finally:
