@@ -193,11 +193,9 @@ class RoverLink:
         """What the station knows of this robot; None where it knows nothing, or says nothing in time."""
         deadline_s = time.monotonic() + within_s
         while not stop.is_set() and (left_s := deadline_s - time.monotonic()) > 0:
-            for reply in self._session.get(keys.robot_report(self._site, self._robot), timeout=left_s):
-                if reply.ok is not None:
-                    return _read_report(self._robot, reply.ok)
-                if reply.err is not None and _is_unknown(reply.err):
-                    return None
+            answered, report = self._ask(left_s, lambda: not stop.is_set())
+            if answered:
+                return report
             stop.wait(min(random.uniform(*_ASK_AGAIN_S), left_s))
         return None
 
@@ -219,7 +217,7 @@ class RoverLink:
         LinkError where the answer cannot be read.
         """
         begun_s, keyframe = time.monotonic(), KeyframeId(boot=self._boot, sequence=sequence)
-        asked, pause_s = 0, _PAUSES_S[0]
+        asked, pause, pause_s = 0, threading.Event(), _PAUSES_S[0]
         while go_on() and (left_s := begun_s + within_s - time.monotonic()) > 0:
             asked_s = time.monotonic()
             answered, report = self._ask(left_s, go_on)
@@ -229,7 +227,7 @@ class RoverLink:
             self._way_s, asked = min(self._way_s, time.monotonic() - asked_s), asked + 1
             if report is not None and has_heard(report, keyframe):
                 return time.monotonic() - begun_s - asked * self._way_s
-            threading.Event().wait(min(random.uniform(0.5, 1.0) * pause_s, left_s))
+            pause.wait(min(random.uniform(0.5, 1.0) * pause_s, left_s))
             pause_s = min(2 * pause_s, _PAUSES_S[1])
         return None if time.monotonic() < begun_s + within_s else float("inf")
 

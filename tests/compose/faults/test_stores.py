@@ -57,21 +57,14 @@ def test_a_database_that_is_stopped(field: Field, books: Books, record: Record, 
     record.add(Row("PostgreSQL stopped", "degraded (store)", {"degraded": noticed_s}, back_s))
 
 
-def test_a_worker_that_is_killed(field: Field, books: Books, record: Record, run: int) -> None:
-    """The cluster's only worker dies: threads of the station stand in, until the container is up again."""
-    field.crash("workers")
+@pytest.mark.parametrize(("service", "name", "within_s"), [("workers", "worker", 90), ("scheduler", "scheduler", 120)])
+def test_a_part_of_the_cluster_that_is_killed(
+    field: Field, books: Books, record: Record, run: int, service: str, name: str, within_s: float
+) -> None:
+    """Its only worker dies, or its scheduler: threads of the station stand in, until the container is up again."""
+    field.crash(service)
     noticed_s = field.until(lambda: part(field, "workers") == "degraded", 30, "degraded")
     goes_on(field)
-    back_s = field.until(lambda: part(field, "workers") == "ready", 90, "ready")
+    back_s = field.until(lambda: part(field, "workers") == "ready", within_s, "ready")
     assert max(books.close().values()) == 0
-    record.add(Row("Dask worker killed", "degraded (workers)", {"degraded": noticed_s}, back_s))
-
-
-def test_a_scheduler_that_is_killed(field: Field, books: Books, record: Record, run: int) -> None:
-    """As with the worker: the station does the work itself until there is a cluster again."""
-    field.crash("scheduler")
-    noticed_s = field.until(lambda: part(field, "workers") == "degraded", 30, "degraded")
-    goes_on(field)
-    back_s = field.until(lambda: part(field, "workers") == "ready", 120, "ready")
-    assert max(books.close().values()) == 0
-    record.add(Row("Dask scheduler killed", "degraded (workers)", {"degraded": noticed_s}, back_s))
+    record.add(Row(f"Dask {name} killed", "degraded (workers)", {"degraded": noticed_s}, back_s))
