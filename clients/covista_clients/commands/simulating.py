@@ -92,7 +92,8 @@ def swarm(
         options = replace(options, pose_rate_hz=default_hz if pose_rate is None else pose_rate)
     progress = _run(options, seconds, accounts)
     sent = f"{progress.keyframes} keyframes and {progress.poses} poses"
-    print(f"{sent}, {progress.skipped} skipped, at most {progress.most_behind_s:.2f} s behind", file=sys.stderr)
+    fates = f"{progress.replaced} of those replaced by newer ones before they went out, {progress.skipped} skipped"
+    print(f"{sent}, {fates}, at most {progress.most_behind_s:.2f} s behind", file=sys.stderr)
 
 
 def render(

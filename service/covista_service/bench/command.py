@@ -26,6 +26,7 @@ def bench(
 ) -> None:
     """Measure, beside what others offer, and say whether the marks hold."""
     import json
+    import signal
 
     from covista_schemas.errors import CovistaError
     from rich.console import Console
@@ -33,6 +34,8 @@ def bench(
     from covista_service.bench.runner import UnknownBenchError, run
 
     rows: list[Row] = []
+    # As Ctrl-C: the processes that a bench has started end with it.
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         with Console(stderr=True).status("measuring") as status:
             for row in run(names or (), long):
@@ -41,6 +44,8 @@ def bench(
     except (UnknownBenchError, CovistaError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(1) from error
+    finally:
+        signal.signal(signal.SIGTERM, before)
     if format == "json":
         typer.echo(json.dumps([row.as_json() for row in rows], allow_nan=False))
     else:

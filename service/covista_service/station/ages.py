@@ -25,7 +25,11 @@ class Ages:
 
     def drop(self, pair: Pair, computed_ns: int) -> None:
         """A pair's answer of that time stands no longer."""
-        self._of_second.get(computed_ns // NS_PER_S, {}).pop(pair, None)
+        second = computed_ns // NS_PER_S
+        pairs = self._of_second.get(second)
+        if pairs is not None and pairs.pop(pair, None) is not None and not pairs:
+            # A dict does not shrink when it is emptied, and there is one for each second until answers are too old.
+            self._of_second[second] = {}
 
     def take(self, until_ns: int) -> list[Pair]:
         """Pairs whose answers were computed until then, the oldest second first; they are noted no longer."""

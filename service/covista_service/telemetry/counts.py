@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections import Counter, deque
+from array import array
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -53,7 +54,9 @@ class Telemetry:
         self.timer = timer
         self._received: Counter[str] = Counter()
         self._outcomes: Counter[str] = Counter()
-        self._latencies_s: deque[float] = deque(maxlen=_SAMPLES)
+        # The newest ones in a ring that is all there from the beginning: a station must not grow by measuring itself.
+        self._latencies_s = array("d", [0.0]) * _SAMPLES
+        self._grouped = 0
         self._under_way: Counter[str] = Counter()
         self._asked = 0
         self._surveys = self._count("covista_surveys", "Surveys by what they came to.", "outcome")
@@ -120,7 +123,8 @@ class Telemetry:
 
     def grouped(self, latency_s: float) -> None:
         """A keyframe shows in the groups, so long after it arrived."""
-        self._latencies_s.append(latency_s)
+        self._latencies_s[self._grouped % _SAMPLES] = latency_s
+        self._grouped += 1
         self._latency.observe(max(0.0, latency_s))
 
     @contextmanager
@@ -152,7 +156,7 @@ class Telemetry:
 
     def summary(self) -> Summary:
         """How it went so far."""
-        latencies_s = sorted(self._latencies_s.copy())
+        latencies_s = sorted(self._latencies_s[: self._grouped])
         return Summary(
             surveys=self._outcomes.total(),
             under_way=self._under_way.total(),

@@ -51,7 +51,8 @@ def test_a_crowd_sends_what_was_made_before(run: Run, endpoint: str, ground: Gro
     lines = err.splitlines()
     assert lines[0].startswith("8 rovers in wall send to")
     assert lines[1] == "72 of 72 keyframes are made"
-    assert lines[2].startswith("16 keyframes and 8 poses, 0 skipped, at most 0.0")
+    fates = "0 of those replaced by newer ones before they went out, 0 skipped"
+    assert lines[2].startswith(f"16 keyframes and 8 poses, {fates}, at most 0.0")
     ground.wait(lambda: not ground.tokens)
 
 
