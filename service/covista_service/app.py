@@ -16,9 +16,10 @@ from covista_service import answers
 from covista_service.access import Gate, Keyring, TokenError, TokenWatch, check_listening, is_loopback
 from covista_service.api import rest
 from covista_service.api.deps import Parts, State
+from covista_service.api.docs_page import DOCS
 from covista_service.api.stream import Stream
-from covista_service.api.vitals import Vitals
 from covista_service.config import Settings, with_stored
+from covista_service.dashboard import PAGES, Sources, add_pages, has_pages, opened
 from covista_service.grouping.warming import warm_up
 from covista_service.link.admission import Lock
 from covista_service.link.inbox import Inbox
@@ -27,6 +28,7 @@ from covista_service.link.publish import Publisher
 from covista_service.link.queries import Queries
 from covista_service.link.station import LinkOptions, StationLink
 from covista_service.loop import Loop
+from covista_service.loop.vitals import Vitals
 from covista_service.station.options import StationOptions
 from covista_service.station.station import Station
 from covista_service.store.archive import Archive
@@ -56,10 +58,16 @@ def create_app(settings: Settings) -> FastAPI:
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[State]:
-        async with _open_parts(settings) as parts:
-            yield {"parts": parts}
+        async with _open_parts(settings) as parts, opened():
+            sources = Sources(
+                parts.name, parts.loop, parts.telemetry, parts.health, parts.vitals, parts.gate, parts.archive
+            )
+            yield {"parts": parts, "dashboard": sources}
 
-    return rest.build(lifespan, settings.cors_origins)
+    first = f"{PAGES.prefix}/" if has_pages() else DOCS
+    app = rest.build(lifespan, settings.cors_origins, PAGES, first)
+    add_pages(app)
+    return app
 
 
 def _has_tokens(settings: Settings) -> bool:

@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import Any, cast
 
 import uvicorn
@@ -37,6 +38,7 @@ _LOOK_S, _PATIENCE_S = 0.2, 5.0
 # How long a thread may keep Python to itself while another waits: 5 ms are noticed where many ask.
 _SWITCH_S = 0.0005
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_SOCKET_BYTES = 64 * 1024
 
 log = logging.getLogger(__name__)
 
@@ -116,7 +118,7 @@ async def _serve(
 
 def _server(stateful: Any, connection: Callable[..., Connection], certificates: Certificates | None) -> _Server:
     """The server of one application; it speaks TLS where there is a certificate."""
-    return _Server(
+    server = _Server(
         uvicorn.Config(
             stateful,
             # Called for each connection like the class that it stands for.
@@ -124,7 +126,9 @@ def _server(stateful: Any, connection: Callable[..., Connection], certificates: 
             lifespan="off",
             log_config=None,
             access_log=False,
-            ws="none",
+            ws="websockets-sansio" if find_spec("websockets") else "none",
+            # A browser has no more to say than which page it looks at.
+            ws_max_size=_SOCKET_BYTES,
             # Whoever asks could write them: an address is that of the connection.
             proxy_headers=False,
             server_header=False,
@@ -132,6 +136,9 @@ def _server(stateful: Any, connection: Callable[..., Connection], certificates: 
             timeout_graceful_shutdown=_GRACE_S,
         )
     )
+    # Now, for NiceGUI looks as it starts through all servers that there are for its own.
+    server.config.load()
+    return server
 
 
 async def _settle(parts: Parts) -> None:

@@ -6,6 +6,7 @@ from covista_service.access.attempts import Attempts
 from covista_service.access.gate import Admitted, Gate, Refusal, Refused
 from covista_service.access.keyring import Door, Keyring
 from covista_service.access.listening import AccessError, check_listening, is_local, is_loopback, warn_of_open_doors
+from covista_service.access.pages import Pages
 from covista_service.access.scopes import Scope
 from covista_service.access.tokens import Token, TokenError, TokenSource
 from covista_service.access.watch import TokenWatch
@@ -17,6 +18,7 @@ __all__ = [
     "Door",
     "Gate",
     "Keyring",
+    "Pages",
     "Refusal",
     "Refused",
     "Scope",

@@ -11,6 +11,7 @@ from enum import StrEnum
 from covista_service.access.attempts import Attempts
 from covista_service.access.keyring import Door, Keyring
 from covista_service.access.scopes import Scope, covers
+from covista_service.access.sessions import Sessions
 from covista_service.access.tokens import Token, is_shaped
 from covista_service.telemetry import about
 
@@ -26,6 +27,10 @@ class Refusal(StrEnum):
     MALFORMED = "malformed"
     UNKNOWN = "unknown"
     REVOKED = "revoked"
+    # What a browser shows is no session any more.
+    SESSION = "session"
+    # A browser was told to ask by a page of somebody else.
+    ORIGIN = "origin"
     SCOPE = "scope"
     LIMITED = "limited"
     # The tokens themselves are not known yet.
@@ -75,6 +80,7 @@ class Gate:
         self.any_host = any_host
         self._news = news
         self._attempts = Attempts() if attempts is None else attempts
+        self.sessions = Sessions()
         self.refused: Counter[str] = Counter({str(reason): 0 for reason in Refusal})
 
     async def admit(self, credentials: list[str], wanted: Scope, address: str) -> Admitted | Refused:
@@ -92,6 +98,25 @@ class Gate:
             return self.refuse(Refusal.SCOPE, address, by=found.name)
         self.keyring.used(found)
         return Admitted(found.name)
+
+    def admit_session(self, secret: str, wanted: Scope, address: str) -> Admitted | Refused:
+        """Judge who shows what `log_in` gave. One that has ended is no failure: nobody guesses 256 bits."""
+        if self.keyring.door is Door.OPEN:
+            return Admitted()
+        session = self.sessions.find(secret)
+        if session is None or not self.keyring.lets_in(session.name):
+            return self.refuse(Refusal.SESSION, address)
+        if not covers(session.scopes, wanted):
+            return self.refuse(Refusal.SCOPE, address, by=session.name)
+        return Admitted(session.name)
+
+    async def log_in(self, secret: str, address: str) -> str | Refused:
+        """A session for who has a token to read with: what the browser is to show from now on."""
+        admitted = await self.admit([f"{_SCHEME} {secret}"], Scope.READ, address)
+        if isinstance(admitted, Refused):
+            return admitted
+        token = self.keyring.find(secret)
+        return "" if token is None else self.sessions.begin(token)
 
     def refuse(self, reason: Refusal, address: str, retry_after_s: int = 0, by: str | None = None) -> Refused:
         """Count and log a refusal; what was shown is no part of it."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+import h11
 from covista_schemas.reports import Problem
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.config import Config
@@ -85,6 +86,12 @@ class Connection(H11Protocol):
         super().data_received(data)
         # A head that comes in drops is no sign of life.
         self._moves += self._under_way and not under_way
+
+    def handle_websocket_upgrade(self, event: h11.Request) -> None:
+        """From now on it is another protocol's, which has pings of its own to tell who is gone."""
+        if self._next_look is not None:
+            self._next_look.cancel()
+        super().handle_websocket_upgrade(event)
 
     def resume_writing(self) -> None:
         """The client has read."""

@@ -6,7 +6,7 @@ import asyncio
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Annotated, TypedDict
+from typing import Annotated, NotRequired, TypedDict
 
 from covista_schemas.keys import ID_PATTERN
 from covista_schemas.reports import Health, Report
@@ -19,8 +19,8 @@ from covista_service.api.delivery import deliver
 from covista_service.api.outgoing import Outgoing
 from covista_service.api.rooms import Room
 from covista_service.api.stream import Stream
-from covista_service.api.vitals import Vitals
 from covista_service.loop import Loop
+from covista_service.loop.vitals import Vitals
 from covista_service.station.census import Census
 from covista_service.station.snapshot import Snapshot
 from covista_service.telemetry import Telemetry
@@ -56,9 +56,10 @@ class Parts:
 
 
 class State(TypedDict):
-    """The application's state, as yielded by its lifespan."""
+    """The application's state, as yielded by its lifespan; what is not ours comes and goes with it."""
 
     parts: Parts
+    dashboard: NotRequired[object]
 
 
 def parts_of(request: Request) -> Parts:

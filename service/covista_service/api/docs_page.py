@@ -17,8 +17,8 @@ FILE_NAMES = ("swagger-ui-bundle.js", "swagger-ui.css", "favicon.png")
 _FOLDER = Path(fastapi_offline.__file__).parent / "static"
 
 
-def serve_docs(app: FastAPI) -> None:
-    """Show the app's description at `DOCS`, and lead there from the root."""
+def serve_docs(app: FastAPI, first: str = DOCS) -> None:
+    """Show the app's description at `DOCS`, and lead from the root to what is to be seen `first`."""
     script, style, icon = (f"{FILES}/{name}" for name in FILE_NAMES)
     app.mount(FILES, StaticFiles(directory=_FOLDER))
 
@@ -34,4 +34,4 @@ def serve_docs(app: FastAPI) -> None:
 
     @app.get("/", include_in_schema=False)
     async def root() -> Response:
-        return RedirectResponse(DOCS)
+        return RedirectResponse(first)

@@ -3,22 +3,30 @@
 Closed unless named here: a route that is added needs a token without anybody thinking of it. What is open tells nothing
 of the robots: who restarts the station, or sends it work, asks `/healthz` and `/readyz` and keeps no secrets, and the
 description is the same for every station, but for whether it asks for tokens.
+
+Who has logged in shows a cookie instead of a token. Browsers send that whoever made them ask, so it counts only where
+they say that a page of this station did.
 """
 
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from http import HTTPStatus
 from ipaddress import ip_address
 from typing import Any
+from urllib.parse import quote, urlsplit
 
 from covista_schemas.reports import Problem
 from fastapi import Response
+from fastapi.responses import RedirectResponse
 from starlette.datastructures import Headers
+from starlette.requests import cookie_parser
 from starlette.types import ASGIApp, Message, Receive, Send
 from starlette.types import Scope as Request
 
-from covista_service.access import Admitted, Gate, Refusal, Refused, Scope, is_loopback
+from covista_service.access import Admitted, Gate, Pages, Refusal, Refused, Scope, is_loopback
+from covista_service.access.sessions import COOKIE
 from covista_service.api.delivery import CUT
 from covista_service.api.deps import State
 from covista_service.api.docs_page import FILE_NAMES, FILES
@@ -44,6 +52,8 @@ _WHY: dict[Refusal, tuple[HTTPStatus, str, str]] = {
     ),
     Refusal.UNKNOWN: (HTTPStatus.UNAUTHORIZED, "this token is not known", 'error="invalid_token"'),
     Refusal.REVOKED: (HTTPStatus.UNAUTHORIZED, "this token is revoked", 'error="invalid_token"'),
+    Refusal.SESSION: (HTTPStatus.UNAUTHORIZED, "this session has ended: log in again", ""),
+    Refusal.ORIGIN: (HTTPStatus.FORBIDDEN, "a page of somebody else has made the browser ask", ""),
     Refusal.SCOPE: (HTTPStatus.FORBIDDEN, "this needs a token of scope {wanted}", 'error="insufficient_scope"'),
     Refusal.LIMITED: (HTTPStatus.TOO_MANY_REQUESTS, "too many requests without a token that is good", ""),
     Refusal.UNREAD: (HTTPStatus.SERVICE_UNAVAILABLE, "the tokens cannot be read; nobody is let in before", ""),
@@ -53,6 +63,8 @@ _WHY: dict[Refusal, tuple[HTTPStatus, str, str]] = {
         "",
     ),
 }
+# What logging in can mend.
+_LOG_IN = frozenset({Refusal.MISSING, Refusal.SESSION})
 # Until the tokens are read, which is tried every second.
 _UNREAD_RETRY_S = 2
 
@@ -64,23 +76,47 @@ def wanted_scope(method: str, path: str) -> Scope | None:
     return Scope.READ if method in _ASKS or (method == "POST" and path in _ASKS_BY_POST) else Scope.OPERATE
 
 
-def guarded(app: ASGIApp) -> ASGIApp:
+def guarded(pages: Pages | None = None) -> Callable[[ASGIApp], ASGIApp]:
     """Lets in only what the gate of the station admits, and notes by whom it was asked."""
 
-    async def answer(scope: Request, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http":
-            # There are no websockets, and none may come past the gate.
-            await (_hang_up(send) if scope["type"] == "websocket" else app(scope, receive, send))
-            return
-        wanted = wanted_scope(scope["method"], scope["path"])
-        found = Admitted() if wanted is None else await _judge(scope, wanted)
-        if isinstance(found, Refused):
-            await _refusal(found, scope["path"], wanted)(scope, receive, send)
-            return
-        scope[BY] = found.by
-        await app(scope, receive, send if wanted is None else _while_let_in(scope, found.by, send))
+    def guard(app: ASGIApp) -> ASGIApp:
+        async def answer(scope: Request, receive: Receive, send: Send) -> None:
+            if scope["type"] == "websocket":
+                admitted = pages is not None and await _opens_socket(scope, pages)
+                await (app(scope, receive, send) if admitted else _hang_up(send))
+                return
+            if scope["type"] != "http":
+                await app(scope, receive, send)
+                return
+            path, mine = scope["path"], pages if pages is not None and pages.holds(scope["path"]) else None
+            wanted = wanted_scope(scope["method"], path) if mine is None else mine.wanted_scope(path)
+            found = Admitted() if wanted is None else await _judge(scope, wanted)
+            if isinstance(found, Refused):
+                sent_on = mine is not None and mine.is_page(path) and found.reason in _LOG_IN
+                refusal = _to_log_in(scope, mine) if mine and sent_on else _refusal(found, path, wanted)
+                await refusal(scope, receive, send)
+                return
+            scope[BY] = found.by
+            await app(scope, receive, send if wanted is None else _while_let_in(scope, found.by, send))
 
-    return answer
+        return answer
+
+    return guard
+
+
+async def _opens_socket(scope: Request, pages: Pages) -> bool:
+    """Whether a page of this station opens a websocket, for who may read."""
+    headers = Headers(scope=scope)
+    below = scope["path"].startswith(f"{pages.prefix}{pages.sockets}")
+    if not below or not _is_own_page(headers) or "origin" not in headers:
+        return False
+    return isinstance(await _judge(scope, Scope.READ), Admitted)
+
+
+def _to_log_in(scope: Request, pages: Pages) -> Response:
+    """And from there back to where one wanted to go."""
+    root, back = scope.get("root_path", ""), scope["path"].removeprefix(pages.prefix) or "/"
+    return RedirectResponse(f"{root}{pages.prefix}{pages.log_in}?next={quote(back)}", HTTPStatus.SEE_OTHER)
 
 
 def _while_let_in(scope: Request, by: str | None, send: Send) -> Send:
@@ -131,10 +167,28 @@ async def _judge(scope: Request, wanted: Scope) -> Admitted | Refused:
     gate = _gate_of(scope)
     headers = Headers(scope=scope)
     address = str((scope.get("client") or ("",))[0])
-    found = await gate.admit(headers.getlist("authorization"), wanted, address)
+    credentials, session = headers.getlist("authorization"), cookie_parser(headers.get("cookie", "")).get(COOKIE)
+    if session and not credentials:
+        found = gate.admit_session(session, wanted, address)
+        if isinstance(found, Admitted) and not _is_own_page(headers, asks=scope.get("method") in _ASKS):
+            return gate.refuse(Refusal.ORIGIN, address, by=found.by)
+    else:
+        found = await gate.admit(credentials, wanted, address)
     if found == Admitted() and not _may_be_called(gate, headers.get("host", "")):
         return gate.refuse(Refusal.HOST, address)
     return found
+
+
+def _is_own_page(headers: Headers, *, asks: bool = False) -> bool:
+    """Whether a browser asks because of a page of this station; one may come from anywhere to what it only `asks` for.
+
+    Browsers say so in Sec-Fetch-Site (Fetch Metadata), those of before 2023 in Origin alone.
+    """
+    site = headers.get("sec-fetch-site", "same-origin")
+    if asks and headers.get("sec-fetch-mode") == "navigate":
+        return True
+    origin = headers.get("origin")
+    return site in ("same-origin", "none") and (origin is None or urlsplit(origin).netloc == headers.get("host"))
 
 
 def _may_be_called(gate: Gate, host: str) -> bool:

@@ -10,8 +10,8 @@ from prometheus_client import CollectorRegistry
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
-from covista_service.api.vitals import Vitals
 from covista_service.loop import CrewStatus, SinkStatus
+from covista_service.loop.vitals import Vitals
 from covista_service.station.census import Census
 from covista_service.station.events import Topic
 from covista_service.station.ledger import Counts

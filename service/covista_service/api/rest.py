@@ -10,11 +10,11 @@ from fastapi.responses import JSONResponse
 from starlette.middleware.cors import CORSMiddleware
 from starlette.types import ASGIApp, Lifespan, Receive, Scope, Send
 
-from covista_service.access import Door
+from covista_service.access import Door, Pages
 from covista_service.api import contract, errors, events, groups, health, pairs, robots, settings, similarity
 from covista_service.api.bodies import bounded
 from covista_service.api.deps import PartsNow
-from covista_service.api.docs_page import serve_docs
+from covista_service.api.docs_page import DOCS, serve_docs
 from covista_service.api.guard import guarded
 from covista_service.api.listening import HEAD_ONLY
 from covista_service.api.timing import PREFIX, timed
@@ -24,8 +24,16 @@ _ASKED_WITH = ("authorization", "content-type", "if-none-match", "last-event-id"
 _TOLD = ("etag", "link", "retry-after", "www-authenticate")
 
 
-def build(lifespan: Lifespan[FastAPI] | None = None, cors_origins: Sequence[str] = ()) -> FastAPI:
-    """The application; its state, `deps.State`, is what `lifespan` yields. Pages of `cors_origins` may ask it."""
+def build(
+    lifespan: Lifespan[FastAPI] | None = None,
+    cors_origins: Sequence[str] = (),
+    pages: Pages | None = None,
+    first: str = DOCS,
+) -> FastAPI:
+    """The application; its state, `deps.State`, is what `lifespan` yields. Pages of `cors_origins` may ask it.
+
+    The door is kept for `pages` too, which somebody else adds; the root leads to what is to be seen `first`.
+    """
     app = FastAPI(
         title="Covista",
         version=version("covista"),
@@ -42,7 +50,7 @@ def build(lifespan: Lifespan[FastAPI] | None = None, cors_origins: Sequence[str]
     errors.install(app, lambda path: contract.methods_of(app.openapi(), path))
     # The last one added is the first to hear of a request.
     app.add_middleware(bounded)
-    app.add_middleware(guarded)
+    app.add_middleware(guarded(pages))
     if cors_origins:
         # Outside of the guard: browsers ask first, without a token, and pages are to read why they stay out.
         app.add_middleware(
@@ -57,7 +65,7 @@ def build(lifespan: Lifespan[FastAPI] | None = None, cors_origins: Sequence[str]
     # FastAPI's way to replace its own description is to assign the method.
     setattr(app, "openapi", contract.describe(app))  # noqa: B010 - mypy refuses the plain assignment
     _serve_description(app)
-    serve_docs(app)
+    serve_docs(app, first)
     return app
 
 

@@ -11,9 +11,9 @@ from covista_service.access import Gate, Keyring
 from covista_service.api import rest
 from covista_service.api.deps import Parts
 from covista_service.api.stream import Stream
-from covista_service.api.vitals import Vitals
 from covista_service.link.mailbox import Depths
 from covista_service.loop import CrewStatus, Loop, SinkStatus
+from covista_service.loop.vitals import Vitals
 from covista_service.station.events import Event
 from covista_service.store.archive import Archive
 from covista_service.telemetry import Telemetry

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from covista_service.loop import CrewStatus, SinkStatus
+from covista_service.loop.parties import CrewStatus, SinkStatus
 
 
 class Mail(Protocol):

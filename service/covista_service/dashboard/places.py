@@ -1,0 +1,17 @@
+"""Where the pages are, and which of them are open."""
+
+from __future__ import annotations
+
+from covista_service.access import Pages
+
+PREFIX = "/dashboard"
+LOG_IN = "/log-in"
+FILES = ("/_nicegui/", "/files/")
+PAGES = Pages(
+    prefix=PREFIX,
+    open=frozenset({LOG_IN, "/session"}),
+    files=FILES,
+    data="/data/",
+    log_in=LOG_IN,
+    sockets="/_nicegui_ws/",
+)

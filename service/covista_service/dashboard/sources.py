@@ -1,0 +1,46 @@
+"""What the pages are given of the station."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Annotated, NotRequired, TypedDict
+
+from covista_schemas.reports import Health
+from fastapi import Depends, Request
+
+from covista_service.access import Gate
+from covista_service.answers.past import Archive
+from covista_service.dashboard.frames import Frames
+from covista_service.loop import Loop
+from covista_service.loop.vitals import Vitals
+from covista_service.telemetry import Telemetry
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sources:
+    """The station as REST has it too; `name` changes with each start."""
+
+    name: str
+    loop: Loop
+    telemetry: Telemetry
+    health: Callable[[], Health]
+    vitals: Callable[[], Vitals]
+    gate: Gate
+    archive: Archive
+    frames: Frames = field(default_factory=Frames)
+
+
+class State(TypedDict):
+    """The part of the application's state that is ours."""
+
+    dashboard: NotRequired[Sources]
+
+
+def sources_of(request: Request) -> Sources:
+    """The station behind the page that asks."""
+    state: State = request.scope["state"]
+    return state["dashboard"]
+
+
+SourcesNow = Annotated[Sources, Depends(sources_of)]

@@ -1,0 +1,54 @@
+// How groups and robots look, the same on all pages. A label keeps its colour for good: by its number, and where
+// colours come again by the shape. The colours are Okabe and Ito's (2008), told apart by eyes that see fewer; those for
+// the dark are as far apart and lighter.
+const LIGHT = ["#0072b2", "#d55e00", "#009e73", "#b0508f", "#8a6d00", "#1f8fc9", "#8c3b00", "#5b5b5b"];
+const DARK = ["#56b4e9", "#ff8c42", "#2fd0a0", "#e59cc9", "#f0e442", "#9ad4ff", "#d9b38c", "#c4c4c4"];
+export const SHAPES = ["circle", "square", "triangle", "diamond", "pentagon", "cross"];
+const NONE = { light: "#767676", dark: "#9a9a9a" };
+
+export const isDark = () => document.body.classList.contains("body--dark");
+
+const numberOf = (label) => (label ? Number(label.slice(1)) || 0 : 0);
+
+export function colourOf(label, dark = isDark()) {
+  if (!label) return dark ? NONE.dark : NONE.light;
+  const palette = dark ? DARK : LIGHT;
+  return palette[(numberOf(label) + palette.length - 1) % palette.length];
+}
+
+export const shapeOf = (label) =>
+  label ? SHAPES[Math.floor((numberOf(label) - 1) / LIGHT.length) % SHAPES.length] : "circle";
+
+// The outline of a shape around a place, as a path of a canvas.
+export function trace(context, shape, x, y, r) {
+  context.beginPath();
+  const corners = { square: [4, 0.25], triangle: [3, 0.5], diamond: [4, 0], pentagon: [5, 0.5] }[shape];
+  if (shape === "cross") {
+    const a = 0.38 * r;
+    const points = [[-a, -r], [a, -r], [a, -a], [r, -a], [r, a], [a, a], [a, r], [-a, r], [-a, a], [-r, a], [-r, -a], [-a, -a]];
+    points.forEach(([dx, dy], k) => (k ? context.lineTo(x + dx, y + dy) : context.moveTo(x + dx, y + dy)));
+  } else if (corners) {
+    const [n, turn] = corners;
+    for (let k = 0; k < n; k++) {
+      const angle = (2 * Math.PI * (k + (turn === 0.5 ? 0 : turn * 2))) / n - Math.PI / 2;
+      const [px, py] = [x + 1.25 * r * Math.cos(angle), y + 1.25 * r * Math.sin(angle)];
+      if (k) context.lineTo(px, py);
+      else context.moveTo(px, py);
+    }
+  } else {
+    context.arc(x, y, r, 0, 2 * Math.PI);
+    return;
+  }
+  context.closePath();
+}
+
+// g2 before g10.
+export const byLabel = (a, b) => numberOf(a) - numberOf(b) || (a < b ? -1 : 1);
+export const byName = (a, b) => a.localeCompare(b, "en", { numeric: true });
+export const percent = (share) => (share === null || share === undefined ? "unknown" : `${Math.round(100 * share)} %`);
+
+export function ago(seconds) {
+  if (seconds === null || seconds === undefined) return "never";
+  if (seconds < 90) return `${Math.round(seconds)} s`;
+  return seconds < 5400 ? `${Math.round(seconds / 60)} min` : `${Math.round(seconds / 360) / 10} h`;
+}
