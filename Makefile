@@ -83,7 +83,7 @@ fault-test: .venv/.dev ## The faults five times, with a table of how soon each i
 # The stamps: what is installed was installed for this pyproject.toml.
 .venv/.demo: pyproject.toml | .venv/bin/python
 	@echo "Installing the station into .venv (a minute or two)"
-	@$(PIP) install --editable '.[station]'
+	@$(PIP) install --editable '.[station,dashboard]'
 	@$(call warm)
 	@touch $@
 

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import ctypes
 import errno
 import gc
 import logging
+import os
+import platform
 import signal
 import socket
 import sys
@@ -39,6 +42,8 @@ _LOOK_S, _PATIENCE_S = 0.2, 5.0
 _SWITCH_S = 0.0005
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _SOCKET_BYTES = 64 * 1024
+# mallopt(3): which setting, and how many heaps.
+_M_ARENA_MAX, _ARENAS = -8, 2
 
 log = logging.getLogger(__name__)
 
@@ -62,6 +67,7 @@ def run(settings: Settings, *, ready: Callable[[Running], None] | None = None, s
 
     In the main thread SIGINT and SIGTERM stop it too, unless `signals` is False.
     """
+    _bound_arenas()
     app = create_app(settings)
     certificates = _certificates(settings)
     listener = _bind(settings.api_address)
@@ -70,6 +76,16 @@ def run(settings: Settings, *, ready: Callable[[Running], None] | None = None, s
         asyncio.run(_serve(app, settings, listener, certificates, ready, signals=signals))
     finally:
         listener.close()
+
+
+def _bound_arenas() -> None:
+    """Have all threads share a few heaps; only where the C library is glibc, and before there are threads.
+
+    It gives each thread one of its own, up to eight a core. Keyframes are read in one and let go of in another, so that
+    each comes to hold what it ever needed at a time, and a station of some thirty threads grows for days.
+    """
+    if platform.libc_ver()[0] == "glibc" and "MALLOC_ARENA_MAX" not in os.environ:
+        ctypes.CDLL(None).mallopt(_M_ARENA_MAX, _ARENAS)
 
 
 async def _serve(

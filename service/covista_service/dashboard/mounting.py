@@ -6,21 +6,15 @@ import asyncio
 import threading
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from importlib.util import find_spec
 
 from fastapi import APIRouter, FastAPI
 
 from covista_service.answers import NotKnownError
-from covista_service.dashboard.places import PREFIX
+from covista_service.dashboard.places import PREFIX, has_pages
 
 _ABSENT = "this station was installed without its pages: pip install 'covista[dashboard]'"
 # NiceGUI has one application a process, in one event loop.
 _turn = threading.Lock()
-
-
-def has_pages() -> bool:
-    """Whether what serves them is installed."""
-    return find_spec("nicegui") is not None
 
 
 def add_pages(app: FastAPI) -> None:
