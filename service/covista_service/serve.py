@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-import ctypes
 import errno
 import gc
 import logging
-import os
-import platform
 import signal
 import socket
 import sys
@@ -25,6 +22,7 @@ from covista_schemas.errors import CovistaError
 from fastapi import FastAPI
 from starlette.types import Receive, Scope, Send
 
+from covista_service import heaps
 from covista_service.access.certificates import Certificates
 from covista_service.api.connection import Connection
 from covista_service.api.deps import Parts
@@ -42,8 +40,6 @@ _LOOK_S, _PATIENCE_S = 0.2, 5.0
 _SWITCH_S = 0.0005
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _SOCKET_BYTES = 64 * 1024
-# mallopt(3): which setting, and how many heaps.
-_M_ARENA_MAX, _ARENAS = -8, 2
 
 log = logging.getLogger(__name__)
 
@@ -67,7 +63,7 @@ def run(settings: Settings, *, ready: Callable[[Running], None] | None = None, s
 
     In the main thread SIGINT and SIGTERM stop it too, unless `signals` is False.
     """
-    _bound_arenas()
+    heaps.bound()
     app = create_app(settings)
     certificates = _certificates(settings)
     listener = _bind(settings.api_address)
@@ -76,16 +72,6 @@ def run(settings: Settings, *, ready: Callable[[Running], None] | None = None, s
         asyncio.run(_serve(app, settings, listener, certificates, ready, signals=signals))
     finally:
         listener.close()
-
-
-def _bound_arenas() -> None:
-    """Have all threads share a few heaps; only where the C library is glibc, and before there are threads.
-
-    It gives each thread one of its own, up to eight a core. Keyframes are read in one and let go of in another, so that
-    each comes to hold what it ever needed at a time, and a station of some thirty threads grows for days.
-    """
-    if platform.libc_ver()[0] == "glibc" and "MALLOC_ARENA_MAX" not in os.environ:
-        ctypes.CDLL(None).mallopt(_M_ARENA_MAX, _ARENAS)
 
 
 async def _serve(
@@ -125,11 +111,15 @@ async def _serve(
             running = Running(_url(settings, listener), settings.link, parts.telemetry.summary, server.stop)
             server.when_started = (lambda: ready(running)) if ready else _nothing
             server.when_stopping = parts.stream.close
-            settling = asyncio.create_task(_settle(parts), name="covista-settling")
+            beside = [
+                asyncio.create_task(_settle(parts), name="covista-settling"),
+                asyncio.create_task(heaps.keep_trim(), name="covista-heaps"),
+            ]
             try:
                 await server.serve([listener])
             finally:
-                settling.cancel()
+                for task in beside:
+                    task.cancel()
 
 
 def _server(stateful: Any, connection: Callable[..., Connection], certificates: Certificates | None) -> _Server:
