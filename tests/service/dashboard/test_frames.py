@@ -1,8 +1,10 @@
+import asyncio
 import json
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
-from covista_service.dashboard.frames import Frames, corners, edges_of, swarm_frame
+from covista_service.dashboard.frames import Frames, Rows, corners, edges_of, swarm_frame
 from covista_service.perception.camera import Pose, rotation_of
 from covista_service.station.snapshot import SimilarityView, Snapshot
 
@@ -26,7 +28,7 @@ def view(overlap: list[list[float]]) -> SimilarityView:
 def test_a_frame_has_a_row_for_each_robot_in_every_column() -> None:
     scene = swarm()
     scene.wait(6)
-    frame = swarm_frame(scene.snapshot)
+    frame = swarm_frame(scene.snapshot, Rows())
     columns = frame["robots"]
     assert columns["id"] == ["r1", "r2", "r3"]
     assert {len(column) for column in columns.values()} == {3}
@@ -40,7 +42,7 @@ def test_a_frame_has_a_row_for_each_robot_in_every_column() -> None:
 def test_who_stands_in_no_group_has_a_reason_and_who_told_no_pose_no_place() -> None:
     scene = swarm()
     scene.wait(40)
-    columns = swarm_frame(scene.snapshot)["robots"]
+    columns = swarm_frame(scene.snapshot, Rows())["robots"]
     assert columns["reason"] == ["gone"] * 3
     assert columns["group"] == [None] * 3
 
@@ -84,23 +86,41 @@ def counted(scene: Scene, asked: list[int]) -> Callable[[], Snapshot]:
 
 def test_who_asks_at_the_same_time_is_told_the_same_made_once() -> None:
     now_s, asked = 0.0, list[int]()
-    frames, scene = Frames(lambda: now_s), swarm()
-    first = frames.swarm("here", counted(scene, asked))
-    assert frames.swarm("here", counted(scene, asked)) == first
-    assert len(asked) == 1
-    now_s = 1.0
-    frames.swarm("here", counted(scene, asked))
-    assert len(asked) == 2
+    frames, snapshot = Frames(lambda: now_s), counted(swarm(), asked)
+
+    async def asking() -> None:
+        nonlocal now_s
+        first, second = await asyncio.gather(frames.swarm("here", snapshot), frames.swarm("here", snapshot))
+        assert first == second
+        assert len(asked) == 1
+        now_s = 1.0
+        await frames.swarm("here", snapshot)
+        assert len(asked) == 2
+
+    asyncio.run(asking())
 
 
 def test_edges_are_left_out_for_who_has_them() -> None:
     now_s = 0.0
     frames, scene = Frames(lambda: now_s), swarm()
-    whole = json.loads(frames.swarm("here", lambda: scene.snapshot))
+
+    def told(matrix: int | None = None) -> Any:
+        return json.loads(asyncio.run(frames.swarm("here", lambda: scene.snapshot, matrix)))
+
+    whole = told()
     assert [each[2:] for each in whole["edges"]["pairs"]] == [[0.5, 0.25]] * 3
     assert whole["station"] == "here"
-    assert json.loads(frames.swarm("here", lambda: scene.snapshot, whole["matrix"]))["edges"] is None
+    assert told(whole["matrix"])["edges"] is None
     scene.send("r4", pose(0.8))
     scene.settle(lambda job: measured())
     now_s = 1.0
-    assert json.loads(frames.swarm("here", lambda: scene.snapshot, whole["matrix"]))["edges"] is not None
+    assert told(whole["matrix"])["edges"] is not None
+
+
+def test_a_row_is_made_anew_only_for_a_robot_that_has_changed() -> None:
+    scene, rows = swarm(), Rows()
+    before = rows.of(list(scene.snapshot.robots.values()))
+    scene.send_pose("r2", pose(5.0))
+    after = rows.of(list(scene.snapshot.robots.values()))
+    assert [new is old for new, old in zip(after, before, strict=True)] == [True, False, True]
+    assert after[1].at_m == [5.0, 0.0, 0.0]
