@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from fastapi import APIRouter, Response
 from nicegui.client import Client
-from prometheus_client import CollectorRegistry
+from prometheus_client import CollectorRegistry, ProcessCollector
 from pydantic_core import to_json
 
 from covista_service.dashboard.checkup import Checkup, Timings
@@ -17,7 +17,8 @@ from covista_service.dashboard.sources import Sources, SourcesNow
 
 _LATENCY, _TURN = "covista_keyframe_to_groups_seconds", "covista_turn_seconds_sum"
 _FAULTS, _MEMORY = "covista_faults_total", "process_resident_memory_bytes"
-_READ = (f"{_LATENCY}_sum", f"{_LATENCY}_count", f"{_LATENCY}_bucket", _TURN, _FAULTS, _MEMORY)
+_READ = (f"{_LATENCY}_sum", f"{_LATENCY}_count", f"{_LATENCY}_bucket", _TURN, _FAULTS)
+_process = ProcessCollector(registry=None)
 
 router = APIRouter(prefix="/data", include_in_schema=False)
 
@@ -60,6 +61,7 @@ def timings_of(registry: CollectorRegistry) -> Timings:
 
 
 def _samples(registry: CollectorRegistry) -> Iterator[tuple[tuple[str, str], float]]:
-    for family in registry.restricted_registry(_READ).collect():
+    # What a process is like is told of no registry by name.
+    for family in (*registry.restricted_registry(_READ).collect(), *_process.collect()):
         for sample in family.samples:
             yield (sample.name, next(iter(sample.labels.values()), "")), sample.value

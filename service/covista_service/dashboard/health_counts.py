@@ -58,7 +58,7 @@ def waiting(checkup: Checkup) -> Iterator[dict[str, Any]]:
     """What waits now, and what for."""
     mail, load, crew = checkup.vitals.mail, checkup.census.workload, checkup.vitals.crew
     extracted = sum(account.waiting for account in checkup.census.accounts.values())
-    said = f"Messages not opened yet, of {mail.robots} robots, {mail.payload_bytes / MB:.1f} MB."
+    said = f"Messages not opened yet, {mail.payload_bytes / MB:.1f} MB; robots with such: {mail.robots}."
     yield _waits("mail", "Mail", mail.messages, said)
     yield _waits("open", "Messages in work", extracted, "Opened, and not decided yet: features are being extracted.")
     yield _waits("jobs", "Jobs under way", checkup.summary.under_way, f"{crew.capacity} of them can run at a time.")

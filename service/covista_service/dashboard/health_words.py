@@ -62,11 +62,10 @@ PARTS: Mapping[str, PartWords] = {
 
 def told(checkup: Checkup) -> dict[str, Any]:
     """All that the page needs; rates it computes itself, from two answers."""
-    needs = list(attention(checkup))
     return {
         "status": checkup.health.status,
-        "sentence": sentence(checkup.health, len(needs)),
-        "attention": needs,
+        "sentence": sentence(checkup.health),
+        "attention": list(attention(checkup)),
         "parts": parts(checkup.health),
         "robots": presence(checkup.census),
         "fates": [_fates(topic, counts) for topic, counts in checkup.census.accounts.items()],
@@ -79,14 +78,12 @@ def told(checkup: Checkup) -> dict[str, Any]:
     }
 
 
-def sentence(health: Health, needs: int) -> str:
-    """The first line."""
+def sentence(health: Health) -> str:
+    """The first line, as far as parts go."""
     off = [_title(name) for name, part in health.parts.items() if part.status != "ready"]
     match health.status:
-        case "ready" if not needs:
-            return "All is well: every part of the station works."
         case "ready":
-            return f"The station works; {_things(needs)} attention."
+            return "Every part of the station works."
         case "degraded":
             return f"The station goes on, but something is wrong: {', '.join(off)}."
         case "starting":
@@ -223,10 +220,6 @@ def _has_pose_off(view: RobotView) -> bool:
 
 def _title(name: str) -> str:
     return PARTS[name].title if name in PARTS else name
-
-
-def _things(count: int) -> str:
-    return "one thing needs" if count == 1 else f"{count} things need"
 
 
 def _robots(names: Sequence[str]) -> str:

@@ -92,11 +92,13 @@ export default {
     const send = async (asking, after) => {
       busy.value = true;
       applyTrouble.value = "";
+      let went = false;
       try {
         const settings = await asked(rest("/settings"), { method: "PATCH", body: patchOf(asking) });
         given += 1;
         proposal.given(settings, asking);
         after();
+        went = true;
       } catch (error) {
         if (error.status === 403) operates.value = false;
         applyTrouble.value = `Nothing was changed: ${error.message}.`;
@@ -106,7 +108,7 @@ export default {
         looking.now();
         // What was pressed is gone, or cannot be pressed again.
         await nextTick();
-        told.value?.focus();
+        if (went) told.value?.focus();
       }
     };
     const clock = () => new Date().toLocaleTimeString();
