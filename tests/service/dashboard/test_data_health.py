@@ -1,5 +1,7 @@
+import asyncio
 import json
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from covista_service.dashboard.data_health import health, timings_of
@@ -31,18 +33,16 @@ def test_timings_are_read_from_what_prometheus_is_told() -> None:
     assert timings.memory_bytes > 1e6
 
 
-async def _body(sources: Sources) -> dict[str, object]:
-    found: dict[str, object] = json.loads(bytes((await health(sources)).body))
+async def _body(sources: Sources) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(bytes((await health(sources)).body))
     return found
 
 
 def test_the_station_is_told_of_as_it_is(sources: Sources) -> None:
-    import asyncio
-
     crowded = replace(sources, listeners=lambda: 3, given_up=lambda: {"slow": 4})
     told = asyncio.run(_body(crowded))
     assert (told["station"], told["status"], told["robots"]) == ("here", "ready", "1 robot (1 live) in 1 groups.")
-    counts = {each["key"]: each["total"] for each in told["counts"]}  # type: ignore[attr-defined]
+    counts = {each["key"]: each["total"] for each in told["counts"]}
     assert counts["client given up/slow"] == 4
     assert counts["not let in on zenoh/unlisted"] == 3
-    assert "3 listeners to events" in dict(told["facts"])["Who listens"]  # type: ignore[call-overload]
+    assert "3 listeners to events" in dict(told["facts"])["Who listens"]

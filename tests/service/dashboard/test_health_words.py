@@ -27,6 +27,7 @@ from covista_service.loop import CrewStatus, SinkStatus
 from covista_service.loop.vitals import Vitals
 from covista_service.station.census import Census
 from covista_service.station.corrections import Correction
+from covista_service.station.events import Topic
 from covista_service.station.ledger import FORGOTTEN, Counts
 from covista_service.station.snapshot import RobotView
 from covista_service.station.workload import Workload
@@ -80,7 +81,8 @@ def needs(found: Checkup) -> list[tuple[str, str]]:
 
 
 def count(found: Checkup, key: str) -> dict[str, Any]:
-    (one,) = (each for each in told(found)["counts"] if each["key"] == key)
+    found_counts: list[dict[str, Any]] = told(found)["counts"]
+    (one,) = (each for each in found_counts if each["key"] == key)
     return one
 
 
@@ -166,7 +168,10 @@ def test_too_much_that_waits_is_told() -> None:
 
 def test_drops_are_told_by_topic_and_reason_with_the_robots_that_have_most() -> None:
     robots = [robot(f"r{k}", poses=Counts(dropped={"bad_pose": k, "malformed": 1})) for k in range(5)]
-    accounts = {"keyframe": Counts(), "pose": Counts(received=30, used=9, dropped={"bad_pose": 11, "malformed": 5})}
+    accounts: dict[Topic, Counts] = {
+        "keyframe": Counts(),
+        "pose": Counts(received=30, used=9, dropped={"bad_pose": 11, "malformed": 5}),
+    }
     found = checkup(robots=robots, census=replace(checkup().census, accounts=accounts))
     one = count(found, "dropped a pose/bad_pose")
     assert (one["total"], one["robots"]) == (11, [("r4", 4), ("r3", 3), ("r2", 2)])

@@ -126,11 +126,13 @@ export default {
     const back = computed(() => last.value
       .map(({ name, was }) => ({ name, value: was, was: live.value[name] }))
       .filter(({ value, was }) => !same(value, was)));
-    const undo = () => send(back.value, () => {
-      const words = back.value;
-      done.value.pop();
-      word.value = `Undone at ${clock()}: ${words.map(says).join("; ")}.`;
-    });
+    const undo = () => {
+      const asking = back.value;
+      return send(asking, () => {
+        done.value.pop();
+        word.value = asking.length ? `Undone at ${clock()}: ${asking.map(says).join("; ")}.` : "Somebody else has undone it already.";
+      });
+    };
     const askUndo = async () => {
       // Others may have changed them since the last look.
       try {
