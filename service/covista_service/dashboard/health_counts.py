@@ -29,21 +29,21 @@ def counts(checkup: Checkup) -> Iterator[dict[str, Any]]:
     for topic, account in checkup.census.accounts.items():
         for reason, total in account.dropped.items():
             most = most_concerned(checkup.robots, topic, reason)
-            yield _count(f"dropped a {topic}", reason, total, DROPPED, most)
+            yield _count(f"Dropped a {topic}", reason, total, DROPPED, most)
         most = _most({view.id: _account(view, topic).missing for view in checkup.robots})
-        yield _count(f"{topic} lost on the way", "missing", account.missing, TROUBLES, most)
+        yield _count(f"{topic.capitalize()} lost on the way", "missing", account.missing, TROUBLES, most)
     vitals, crew = checkup.vitals, checkup.vitals.crew
     work = {"lost": crew.lost, "retried": crew.retried, "overdue": crew.overdue, "given_up": crew.given_up}
     failed = {WORKER_FAILED: checkup.summary.outcomes.get(WORKER_FAILED, 0)}
     news = {name: sink.lost for name, sink in vitals.sinks.items()}
     for about, of, words in (
-        ("turned away on zenoh", vitals.turned_away, TURNED_AWAY),
-        ("not let in on zenoh", vitals.link_refused, LINK_REFUSED),
-        ("not let in here", checkup.refused, ACCESS_REFUSED),
-        ("client given up", checkup.given_up, GIVEN_UP),
-        ("error of the station", checkup.timings.faults, TROUBLES),
-        ("trouble with workers", work | failed, TROUBLES),
-        ("news lost", news, TROUBLES),
+        ("Turned away on zenoh", vitals.turned_away, TURNED_AWAY),
+        ("Not let in on zenoh", vitals.link_refused, LINK_REFUSED),
+        ("Not let in here", checkup.refused, ACCESS_REFUSED),
+        ("Client given up", checkup.given_up, GIVEN_UP),
+        ("Error of the station", checkup.timings.faults, TROUBLES),
+        ("Trouble with workers", work | failed, TROUBLES),
+        ("News lost", news, TROUBLES),
     ):
         for reason, total in of.items():
             yield _count(about, reason, total, words)
@@ -65,7 +65,7 @@ def waiting(checkup: Checkup) -> Iterator[dict[str, Any]]:
     for queue, count in load.waiting.items():
         yield _waits(f"pairs.{queue}", f"Pairs: {queue}", count, _QUEUES.get(queue, "Wait for a survey."))
     yield _waits(
-        "forecasts", "Poses", load.forecasts_waiting, "Robots that moved and whose overlaps are to be read anew."
+        "forecasts", "New poses", load.forecasts_waiting, "Robots that moved and whose overlaps are to be read anew."
     )
     for name, sink in checkup.vitals.sinks.items():
         yield _waits(f"news.{name}", f"News for {name}", sink.waiting, "Events and groups that are still to be told.")

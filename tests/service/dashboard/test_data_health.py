@@ -43,6 +43,6 @@ def test_the_station_is_told_of_as_it_is(sources: Sources) -> None:
     told = asyncio.run(_body(crowded))
     assert (told["station"], told["status"], told["robots"]) == ("here", "ready", "1 robot (1 live) in 1 groups.")
     counts = {each["key"]: each["total"] for each in told["counts"]}
-    assert counts["client given up/slow"] == 4
-    assert counts["not let in on zenoh/unlisted"] == 3
+    assert counts["Client given up/slow"] == 4
+    assert counts["Not let in on zenoh/unlisted"] == 3
     assert "3 listeners to events" in dict(told["facts"])["Who listens"]

@@ -173,7 +173,7 @@ def test_drops_are_told_by_topic_and_reason_with_the_robots_that_have_most() -> 
         "pose": Counts(received=30, used=9, dropped={"bad_pose": 11, "malformed": 5}),
     }
     found = checkup(robots=robots, census=replace(checkup().census, accounts=accounts))
-    one = count(found, "dropped a pose/bad_pose")
+    one = count(found, "Dropped a pose/bad_pose")
     assert (one["total"], one["robots"]) == (11, [("r4", 4), ("r3", 3), ("r2", 2)])
     assert "quaternion" in one["means"]
     assert one["bearable"] == 0
@@ -192,21 +192,21 @@ def test_what_was_refused_and_lost_is_told_with_its_meaning() -> None:
     found = checkup(vitals=vitals, timings=Timings(faults={"loop": 8}), refused={"unknown": 9}, given_up={"slow": 10})
     totals = {each["key"]: each["total"] for each in told(found)["counts"] if each["total"]}
     assert totals == {
-        "turned away on zenoh/wrong_key": 2,
-        "not let in on zenoh/unlisted": 3,
-        "trouble with workers/lost": 5,
-        "trouble with workers/given_up": 6,
-        "news lost/history": 7,
-        "error of the station/loop": 8,
-        "not let in here/unknown": 9,
-        "client given up/slow": 10,
+        "Turned away on zenoh/wrong_key": 2,
+        "Not let in on zenoh/unlisted": 3,
+        "Trouble with workers/lost": 5,
+        "Trouble with workers/given_up": 6,
+        "News lost/history": 7,
+        "Error of the station/loop": 8,
+        "Not let in here/unknown": 9,
+        "Client given up/slow": 10,
     }
-    assert "is not in the list" in count(found, "not let in on zenoh/unlisted")["means"]
+    assert "is not in the list" in count(found, "Not let in on zenoh/unlisted")["means"]
 
 
 def test_a_reason_without_words_is_counted_all_the_same() -> None:
     found = checkup(given_up={"bored": 1})
-    assert count(found, "client given up/bored")["means"] == UNTOLD.means
+    assert count(found, "Client given up/bored")["means"] == UNTOLD.means
 
 
 def test_every_reason_that_the_station_has_is_put_into_words() -> None:

@@ -36,9 +36,13 @@ export default {
       const levels = needs.value.map(({ level }) => level);
       return levels.includes("bad") || now.value.status === "stopping" ? "bad" : levels.includes("warn") || now.value.status !== "ready" ? "warn" : "good";
     });
-    const fates = computed(() => (now.value?.fates ?? []).map((account) => ({
-      topic: account.topic,
-      cells: FATES.map(([fate]) => ({ fate, total: account[fate], rate: samples.rate((answer) => answer.fates.find(({ topic }) => topic === account.topic)?.[fate]) })),
+    const fates = computed(() => FATES.map(([fate, title]) => ({
+      fate,
+      title,
+      cells: (now.value?.fates ?? []).map((account) => {
+        const read = (answer) => answer.fates.find(({ topic }) => topic === account.topic)?.[fate];
+        return { topic: account.topic, total: account[fate], rate: samples.rate(read) };
+      }),
     })));
     const waiting = computed(() => (now.value?.waiting ?? []).map((each) => ({
       ...each, past: samples.values((answer) => answer.waiting.find(({ key }) => key === each.key)?.value),
@@ -81,33 +85,31 @@ export default {
       <section class="cv-card cv-wide" aria-labelledby="cv-drops">
         <h2 id="cv-drops">Dropped, refused, lost</h2>
         <p v-if="!happened.length">Nothing, since the station started.</p>
-        <div v-else class="cv-scroll"><table class="cv-table">
-          <thead><tr><th scope="col">What</th><th scope="col" class="cv-number">A minute now</th><th scope="col" class="cv-number">Since the start</th>
-            <th scope="col">What it means, what to do</th><th scope="col">Most from</th></tr></thead>
+        <table v-else class="cv-table">
+          <thead><tr><th scope="col">What</th><th scope="col" class="cv-number">A minute now</th><th scope="col" class="cv-number">Since the start</th></tr></thead>
           <tbody><tr v-for="each in happened" :key="each.key" :class="{ 'cv-grave': each.grave }">
-            <th scope="row">{{ each.about }}<br><code>{{ each.reason }}</code></th>
-            <td class="cv-number">{{ rounded(each.rate) }}</td><td class="cv-number">{{ each.total }}</td>
-            <td>{{ each.means }} <i>{{ each.todo }}</i></td>
-            <td><template v-for="([robot, count], k) in each.robots" :key="robot">{{ k ? ", " : "" }}<a :href="page('/robots/' + robot)">{{ robot }}</a> ({{ count }})</template></td></tr></tbody>
-        </table></div>
+            <th scope="row">{{ each.about }}: {{ each.reason }}
+              <small>{{ each.means }} <i>{{ each.todo }}</i>
+                <template v-if="each.robots.length"> Most from <template v-for="([robot, count], k) in each.robots" :key="robot">{{ k ? ", " : "" }}<a :href="page('/robots/' + robot)">{{ robot }}</a> ({{ count }})</template>.</template></small></th>
+            <td class="cv-number">{{ rounded(each.rate) }}</td><td class="cv-number">{{ each.total }}</td></tr></tbody>
+        </table>
       </section>
-      <section class="cv-card cv-wide" aria-labelledby="cv-fates">
+      <section class="cv-card" aria-labelledby="cv-fates">
         <h2 id="cv-fates">What became of messages</h2>
-        <div class="cv-scroll"><table class="cv-table">
-          <thead><tr><th scope="col">Since the start (a minute now)</th><th v-for="[fate, title] in FATES" :key="fate" scope="col" class="cv-number">{{ title }}</th></tr></thead>
-          <tbody><tr v-for="row in fates" :key="row.topic"><th scope="row">{{ row.topic }}s</th>
-            <td v-for="cell in row.cells" :key="cell.fate" class="cv-number">{{ cell.total }}
-              <small v-if="cell.fate !== 'waiting'">({{ rounded(cell.rate) }})</small></td></tr></tbody>
-        </table></div>
+        <table class="cv-table">
+          <thead><tr><th scope="col">Since the start <small>a minute now</small></th><th v-for="each in now.fates" :key="each.topic" scope="col" class="cv-number">{{ each.topic }}s</th></tr></thead>
+          <tbody><tr v-for="row in fates" :key="row.fate"><th scope="row">{{ row.title }}</th>
+            <td v-for="cell in row.cells" :key="cell.topic" class="cv-number">{{ cell.total }}<small>{{ row.fate === "waiting" ? "" : rounded(cell.rate) }}</small></td></tr></tbody>
+        </table>
         <p class="cv-soft">That newer messages overtake older ones is as it should be: the newest of everything is used.</p>
       </section>
       <section class="cv-card" aria-labelledby="cv-waiting">
         <h2 id="cv-waiting">What waits now</h2>
-        <div class="cv-scroll"><table class="cv-table">
+        <table class="cv-table">
           <thead><tr><th scope="col">What</th><th scope="col" class="cv-number">Now</th><th scope="col">Last minutes</th></tr></thead>
-          <tbody><tr v-for="each in waiting" :key="each.key"><th scope="row">{{ each.name }}<br><small>{{ each.means }}</small></th>
+          <tbody><tr v-for="each in waiting" :key="each.key"><th scope="row">{{ each.name }}<small>{{ each.means }}</small></th>
             <td class="cv-number">{{ each.value }}</td><td><spark-line :values="each.past" :name="each.name"></spark-line></td></tr></tbody>
-        </table></div>
+        </table>
       </section>
       <section class="cv-card" aria-labelledby="cv-facts">
         <h2 id="cv-facts">More of the station</h2>

@@ -34,6 +34,7 @@ const Members = {
   },
   template: `
     <ul class="cv-inline">
+      <li v-if="shown.length > SHOWN"><b>{{ shown.length }} robots:</b></li>
       <li v-for="robot in shown.slice(0, SHOWN)" :key="robot">
         <a :href="page('/robots/' + robot)" :class="{ 'cv-mover': moved.has(robot) }">{{ robot }}</a><small v-if="moved.has(robot)"> {{ where(robot) }}</small>
       </li>
