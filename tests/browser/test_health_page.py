@@ -166,6 +166,16 @@ def test_groups_that_come_late_are_told_while_they_do(page: Page, station: Place
     page.get_by_text("900 ms on average in the last minute").wait_for()
 
 
+def test_before_the_first_keyframe_no_latency_is_made_up(page: Page, station: Place) -> None:
+    def silent(found: Answer, _asked: int) -> None:
+        found["latency"] = {"p50_ms": None, "p99_ms": None, "sum_s": 0.0, "count": 0, "slow": 0}
+
+    told(page, silent)
+    opened(page)
+    page.get_by_text("No keyframe has shown in the groups yet.").wait_for()
+    assert " ms" not in page.locator("section[aria-labelledby=cv-latency]").inner_text()
+
+
 def test_all_numbers_are_a_link_away(page: Page, station: Place) -> None:
     opened(page)
     for name, words in (("metrics", "covista_messages_total"), ("what programs can ask", "swagger")):

@@ -264,6 +264,23 @@ def test_a_station_too_busy_for_previews_says_so_and_is_asked_again(page: Page, 
     assert page.get_by_text("No preview now").count() == 0
 
 
+def test_a_station_that_does_not_answer_is_told_at_the_top_and_nothing_breaks(
+    page: Page, station: Place, visitor: Any
+) -> None:
+    asked = re.compile("/api/v1/|/dashboard/data/")
+    visitor.allow("^failed: .*(/api/v1/|/dashboard/data/)", "^console error: Failed to load resource")
+    tried(page)
+    page.route(asked, lambda route: route.abort("connectionrefused"))
+    say(page, "alpha", "0.8")
+    said(page, "The station has not answered for")
+    page.get_by_role("button", name="Apply ...").click()
+    confirm(page, "Apply")
+    said(page, "^No answer came: look below whether the settings are in force")
+    page.unroute(asked)
+    said(page, r"would move\.")
+    assert settings(page, station) == AS_THEY_ARE
+
+
 def test_on_a_phone_nothing_is_wider_than_the_page(page: Page, station: Place) -> None:
     page.set_viewport_size({"width": 390, "height": 844})
     tried(page, "?groups=2-4&alpha=0.2")

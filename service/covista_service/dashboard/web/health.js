@@ -51,7 +51,8 @@ export default {
       const [sum, count] = [(answer) => answer.latency.sum_s, (answer) => answer.latency.count];
       const mean = samples.ratio(sum, count);
       const past = samples.ratios(sum, count).map((value) => (value === null ? null : 1000 * value));
-      return { ...now.value.latency, mean_ms: mean === null ? null : 1000 * mean, past, highest: past.length ? Math.max(...past) : null };
+      const known = past.filter((value) => value !== null);
+      return { ...now.value.latency, mean_ms: mean === null ? null : 1000 * mean, past, highest: known.length ? Math.max(...known) : null };
     });
     const ms = (value) => (value === null ? "not known yet" : `${Math.round(value)} ms`);
     return { now, trouble, at, needs, line, mood, fates, happened, waiting, latency, ms, rounded, page, root, FATES, LEVELS };
@@ -77,10 +78,14 @@ export default {
       </section>
       <section class="cv-card" aria-labelledby="cv-latency">
         <h2 id="cv-latency">From a keyframe to groups</h2>
-        <p class="cv-big">{{ ms(latency.mean_ms) }} <small>on average in the last minute</small></p>
-        <spark-line :values="latency.past" name="Latency" unit="ms" wide></spark-line>
-        <p class="cv-soft">Since this page was opened, the last five minutes at most; highest {{ ms(latency.highest) }}.</p>
-        <p>Half of them within {{ ms(latency.p50_ms) }}, 99 of 100 within {{ ms(latency.p99_ms) }}<template v-if="latency.count">, of {{ latency.count }} since the start; {{ latency.slow }} took longer than half a second</template>.</p>
+        <p v-if="!latency.count">No keyframe has shown in the groups yet.</p>
+        <template v-else>
+          <p v-if="latency.mean_ms === null" class="cv-big"><small>No keyframe in the last minute</small></p>
+          <p v-else class="cv-big">{{ ms(latency.mean_ms) }} <small>on average in the last minute</small></p>
+          <spark-line :values="latency.past" name="Latency" unit="ms" wide></spark-line>
+          <p class="cv-soft">Since this page was opened, the last five minutes at most<template v-if="latency.highest !== null">; highest {{ ms(latency.highest) }}</template>.</p>
+          <p>Half of them within {{ ms(latency.p50_ms) }}, 99 of 100 within {{ ms(latency.p99_ms) }}, of {{ latency.count }} since the start; {{ latency.slow }} took longer than half a second.</p>
+        </template>
       </section>
       <section class="cv-card cv-wide" aria-labelledby="cv-drops">
         <h2 id="cv-drops">Dropped, refused, lost</h2>

@@ -105,7 +105,7 @@ export default {
         if (error instanceof Lost) applyTrouble.value = "No answer came: look below whether the settings are in force.";
       } finally {
         [busy.value, applying.value, undoing.value] = [false, false, false];
-        looking.now();
+        looking.soon();
         // What was pressed is gone, or cannot be pressed again.
         await nextTick();
         if (went) told.value?.focus();
@@ -150,7 +150,7 @@ export default {
     };
   },
   template: `
-    <p v-if="!live" class="cv-soft">Asking the station.</p>
+    <p v-if="!live" :class="trouble ? 'cv-problem' : 'cv-soft'" role="status">{{ trouble || "Asking the station." }}</p>
     <div v-else class="cv-what-if">
       <form class="cv-panel" aria-label="Settings to try" @submit.prevent>
         <p v-if="unread.length" class="cv-problem" role="status">The address names what is no setting, or no value of one; it was left out: {{ unread.join(", ") }}</p>

@@ -56,11 +56,11 @@ export default {
         <span v-if="then">Scores say which number is best under its own settings, and not which settings are better.
           <template v-if="!alike">Of two criteria each has its own scale.</template></span></figcaption>
       <details><summary>As a table</summary>
-        <div class="cv-scroll"><table class="cv-table">
+        <table class="cv-table">
           <thead><tr><th scope="col" class="cv-number">Groups</th><th v-for="each in reports" :key="each.key" scope="col" class="cv-number">Score {{ each.title }}</th></tr></thead>
           <tbody><tr v-for="groups in numbers" :key="groups"><td class="cv-number">{{ groups }}</td>
             <td v-for="each in reports" :key="each.key" class="cv-number">{{ scoreOf(each.report, groups)?.toFixed(3) ?? "not looked at" }}</td></tr></tbody>
-        </table></div></details>
+        </table></details>
     </figure>
     <p v-else>No number of groups was looked at yet.</p>`,
 };
