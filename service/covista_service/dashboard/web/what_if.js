@@ -72,7 +72,8 @@ export default {
       const [before, after] = [now.value.groups.length, then.value.groups.length];
       const much = before === after ? `Still ${number(after)}` : `${number(after)} instead of ${before}`;
       if (!moved.value.length) return `${much}: nobody would move.`;
-      return `${much}: ${named(moved.value.map(({ robot }) => robot))} would move.`;
+      const names = moved.value.map(({ robot }) => robot);
+      return names.length > MOST_NAMED ? `${much}: ${names.length} robots would move.` : `${much}: ${named(names)} would move.`;
     });
     // Who would move as settings are, if nothing held on to the groups on show.
     const anyway = computed(() => {
