@@ -62,7 +62,15 @@ def create_app(settings: Settings) -> FastAPI:
     async def lifespan(_app: FastAPI) -> AsyncIterator[State]:
         async with _open_parts(settings) as parts, opened():
             sources = Sources(
-                parts.name, parts.loop, parts.telemetry, parts.health, parts.vitals, parts.gate, parts.archive
+                parts.name,
+                parts.loop,
+                parts.telemetry,
+                parts.health,
+                parts.vitals,
+                parts.gate,
+                parts.archive,
+                listeners=lambda: parts.stream.listeners,
+                given_up=lambda: parts.outgoing.given_up + parts.stream.given_up,
             )
             yield {"parts": parts, "dashboard": sources}
 

@@ -29,9 +29,11 @@ def add_pages(app: FastAPI) -> None:
 
         app.include_router(routes)
         return
-    from covista_service.dashboard import data, log_in, serving
+    from covista_service.dashboard import data, data_health, data_settings, log_in, serving
 
     routes.include_router(data.router)
+    routes.include_router(data_health.router)
+    routes.include_router(data_settings.router)
     routes.include_router(log_in.router)
     app.include_router(routes)
     app.mount(PREFIX, serving.application())
