@@ -60,7 +60,14 @@ def create_app(settings: Settings) -> FastAPI:
     async def lifespan(_app: FastAPI) -> AsyncIterator[State]:
         async with _open_parts(settings) as parts, opened():
             sources = Sources(
-                parts.name, parts.loop, parts.telemetry, parts.health, parts.vitals, parts.gate, parts.archive
+                parts.name,
+                parts.loop,
+                parts.telemetry,
+                parts.health,
+                parts.vitals,
+                parts.gate,
+                parts.archive,
+                parts.readers,
             )
             yield {"parts": parts, "dashboard": sources}
 

@@ -11,6 +11,7 @@ from pydantic_core import to_json
 from covista_service.access import Door, Scope
 from covista_service.access.scopes import covers
 from covista_service.access.sessions import COOKIE
+from covista_service.dashboard import data_past, data_robot
 from covista_service.dashboard.sources import Sources, SourcesNow
 from covista_service.dashboard.why import why
 
@@ -18,6 +19,8 @@ JSON = "application/json"
 RobotQuery = Annotated[str, Query(pattern=f"^{ID_PATTERN}$")]
 
 router = APIRouter(prefix="/data", include_in_schema=False)
+router.include_router(data_past.router)
+router.include_router(data_robot.router)
 
 
 @router.get("/session")

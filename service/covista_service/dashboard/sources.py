@@ -13,13 +13,14 @@ from covista_service.access import Gate
 from covista_service.answers.past import Archive
 from covista_service.dashboard.frames import Frames
 from covista_service.loop import Loop
+from covista_service.loop.rooms import Room
 from covista_service.loop.vitals import Vitals
 from covista_service.telemetry import Telemetry
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sources:
-    """The station as REST has it too; `name` changes with each start."""
+    """The station as REST has it too; `name` changes with each start. `readers` read the archive in threads."""
 
     name: str
     loop: Loop
@@ -28,6 +29,7 @@ class Sources:
     vitals: Callable[[], Vitals]
     gate: Gate
     archive: Archive
+    readers: Room = field(default_factory=lambda: Room(at_once=2, waiting=20))
     frames: Frames = field(default_factory=Frames)
 
 
