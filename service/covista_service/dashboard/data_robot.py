@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from covista_schemas.keys import ID_PATTERN
+from covista_schemas.reports import time_of
 from fastapi import APIRouter, Depends, Path, Response
 from pydantic_core import to_json
 
@@ -28,7 +29,11 @@ async def words(robot: RobotPath, sources: SourcesNow) -> Response:
     """The robot in sentences. One that is not known is no error: the page says so, and goes on asking."""
     snapshot = sources.loop.snapshot()
     view = snapshot.robots.get(robot)
-    found: dict[str, object] = {"station": sources.name, "known": view is not None}
+    found: dict[str, object] = {
+        "station": sources.name,
+        "time": time_of(snapshot.wall_ns).isoformat(),
+        "known": view is not None,
+    }
     if view is not None:
         found |= {
             "standing": robot_words.standing(snapshot, view),

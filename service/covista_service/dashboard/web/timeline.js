@@ -114,7 +114,7 @@ export default {
           <button @click="shift(-0.5)">Earlier</button>
           <button :disabled="untilMs === null" @click="shift(0.5)">Later</button>
         </div>
-        <span class="cv-soft">{{ length(shown.span) }}</span>
+        <span class="cv-soft">{{ length(shown.span) }} are shown</span>
         <button class="cv-live" :class="{ 'cv-main-action': untilMs !== null }" :aria-pressed="untilMs === null" @click="live">Live</button>
       </div>
       <p v-if="problem" class="cv-problem" role="alert">The past cannot be shown now: {{ problem }}. Trying again.</p>
@@ -122,7 +122,7 @@ export default {
       <template v-if="bands">
         <p v-if="!bands.robots.length">No groups are kept of this time. Choose a longer one, or go earlier.</p>
         <group-bands :bands="bands" :events="events.items" :time="shown.time" @scrub="scrub"></group-bands>
-        <p class="cv-soft">Times are {{ zone() }}.{{ clockWords }}
+        <p class="cv-soft">Times are in {{ zone() }}.{{ clockWords }}
           <template v-if="bands.thinned">So long a time is thinned: groups are looked at now and then, and short changes between are not drawn. Zoom in to see all.</template></p>
         <ul v-if="bands.gaps.length" class="cv-list"><li v-for="gap in bands.gaps" :key="gap.since_ms + gap.reason">
           <span>Hatched: from {{ spoken(gap.since_ms) }} to {{ spoken(gap.until_ms) }} something is missing: {{ gap.reason }}.</span></li></ul>

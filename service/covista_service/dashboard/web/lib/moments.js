@@ -19,9 +19,9 @@ export const spoken = (ms, now = Date.now()) => (DAY.format(ms) === DAY.format(n
 
 export function length(seconds) {
   const round = (value) => Number(value.toPrecision(2));
-  if (seconds < 90) return `${round(seconds)} s`;
-  if (seconds < 5400) return `${round(seconds / 60)} min`;
-  return seconds < 172800 ? `${round(seconds / 3600)} h` : `${round(seconds / 86400)} d`;
+  if (seconds < 60) return `${round(seconds)} s`;
+  if (seconds < 3600) return `${round(seconds / 60)} min`;
+  return seconds < 86400 ? `${round(seconds / 3600)} h` : `${round(seconds / 86400)} d`;
 }
 
 // Where a scale has its marks: [{ ms, words }], no more than `most`.

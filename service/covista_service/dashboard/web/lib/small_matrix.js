@@ -46,7 +46,7 @@ export default {
       if (canvas.value.width !== Math.round(side * ratio)) canvas.value.width = canvas.value.height = Math.round(side * ratio);
       const context = canvas.value.getContext("2d");
       context.setTransform(ratio, 0, 0, ratio, 0, 0);
-      const [paper, soft, ink] = dark.value ? ["#14181d", "#2a323b", "#7cc4ff"] : ["#ffffff", "#ececea", "#003f73"];
+      const [paper, soft, ink] = dark.value ? ["#1b2128", "#2a323b", "#7cc4ff"] : ["#ffffff", "#ececea", "#003f73"];
       context.fillStyle = paper;
       context.fillRect(0, 0, side, side);
       const count = robots.value.length;
@@ -113,7 +113,7 @@ export default {
   template: `
     <figure class="cv-small-matrix">
       <canvas ref="canvas" role="img" :aria-label="words" @pointermove="move" @pointerleave="pointed = ''"></canvas>
-      <figcaption>{{ pointed || 'Row: whose view. Column: who sees it. The darker, the more of it.' }}</figcaption>
+      <figcaption>{{ pointed || 'Row: whose view. Column: who sees it. The stronger the colour, the more of it.' }}</figcaption>
       <details v-if="pairs.length"><summary>Pairs in words</summary>
         <ul class="cv-list">
           <li v-for="each in pairs" :key="each.a + ' ' + each.b"><a :href="page('/pairs/' + each.a + '/' + each.b)">{{ each.a }} and {{ each.b }}</a>
