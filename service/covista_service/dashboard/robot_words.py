@@ -30,7 +30,6 @@ _UNTOLD = "The station could not use it."
 _UNGROUPED = {"no_pose": "It has told no pose yet, so it stands in no group.", "gone": "So it stands in no group."}
 # A clock that is off by less is well set, as far as one can tell from messages that take some time.
 _CLOCK_S = 0.25
-_LITTLE_DEG, _LITTLE_M = 0.5, 0.02
 
 
 def standing(snapshot: Snapshot, view: RobotView) -> list[str]:
@@ -75,13 +74,14 @@ def pose(view: RobotView) -> str:
         return "It has told no pose yet."
     if view.correction is None:
         return "Whether its pose is right cannot be told: no other robot's images have been compared with its own yet."
-    if view.correction.deg < _LITTLE_DEG and view.correction.m < _LITTLE_M:
+    return _agreement(view.correction)
+
+
+def _agreement(correction: Correction) -> str:
+    if not correction.disagreeing:
         return "Its pose is right, as far as its images and those of others tell."
-    return f"By its images its pose is off by {_off(view.correction)}."
-
-
-def _off(correction: Correction) -> str:
-    return f"{correction.deg:.1f} degrees and {correction.m:.2f} m"
+    often = "" if correction.disagreeing == 1 else f", {correction.disagreeing} keyframes in a row"
+    return f"By the images its pose is off by {correction.deg:.1f} degrees and {correction.m:.2f} m{often}."
 
 
 def dropped(view: RobotView) -> list[dict[str, Any]]:

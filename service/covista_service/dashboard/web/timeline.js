@@ -109,8 +109,8 @@ export default {
           <button v-for="[seconds, words] in SPANS" :key="seconds" :aria-pressed="shown.span === seconds" @click="spanned(seconds)">{{ words }}</button>
         </div>
         <div role="group" aria-label="Which part" class="cv-pick">
-          <button aria-label="Zoom in" :disabled="shown.span <= SHORTEST_S" @click="spanned(shown.span / 2)">+</button>
-          <button aria-label="Zoom out" :disabled="shown.span >= LONGEST_S" @click="spanned(shown.span * 2)">−</button>
+          <button aria-label="Zoom time in" :disabled="shown.span <= SHORTEST_S" @click="spanned(shown.span / 2)">+</button>
+          <button aria-label="Zoom time out" :disabled="shown.span >= LONGEST_S" @click="spanned(shown.span * 2)">−</button>
           <button @click="shift(-0.5)">Earlier</button>
           <button :disabled="untilMs === null" @click="shift(0.5)">Later</button>
         </div>

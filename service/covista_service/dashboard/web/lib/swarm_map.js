@@ -77,6 +77,7 @@ export default {
     };
     const observer = new ResizeObserver(resize);
     onMounted(() => {
+      if (revision !== null) canvas.value.dataset.revision = revision;
       resize();
       observer.observe(canvas.value);
     });
