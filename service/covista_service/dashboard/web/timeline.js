@@ -71,7 +71,8 @@ export default {
     };
     const shift = (share) => {
       const to = (untilMs.value ?? nowMs()) + share * 1000 * shown.span;
-      untilMs.value = to >= nowMs() && shown.time === null ? null : Math.min(nowMs(), to);
+      // Nearly now is now, and goes on.
+      untilMs.value = to >= nowMs() - 50 * shown.span && shown.time === null ? null : Math.min(nowMs(), to);
     };
     watch(shown, () => history.replaceState(history.state, "", addressOf(shown)));
     watch([shown, untilMs], past.beat);

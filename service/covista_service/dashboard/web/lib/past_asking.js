@@ -81,6 +81,10 @@ export function usePast(span, kinds) {
     events.value = await newestEvents(found.since_ms, found.until_ms, { kinds: kinds() });
   }
 
+  // Who stops it where it stands has all that is wanted.
+  const stands = ({ spanMs, untilMs }) =>
+    bands.value !== null && askedKinds === kinds().join() && untilMs === bands.value.until_ms && spanMs === untilMs - bands.value.since_ms;
+
   async function follow({ spanMs }) {
     const known = bands.value;
     const since = known.until_ms - AGAIN_MS;
@@ -88,6 +92,8 @@ export function usePast(span, kinds) {
     const seen = new Set(events.value.items.map((event) => event.id));
     const { items } = await newestEvents(since, news.until_ms + 1000, { kinds: kinds() });
     const fresh = items.filter((event) => !seen.has(event.id));
+    // Meanwhile it may have been stopped.
+    if (span().untilMs !== null) return;
     aheadMs.value = news.now_ms - Date.now();
     bands.value = { ...news, since_ms: news.until_ms - spanMs };
     if (fresh.length) events.value = { ...events.value, items: [...events.value.items, ...fresh].slice(-MOST_EVENTS) };
@@ -98,7 +104,8 @@ export function usePast(span, kinds) {
       const wanted = span();
       const key = JSON.stringify(wanted);
       const old = Date.now() - loadedMs > Math.max(60000, wanted.spanMs / 100);
-      if (key !== asking || askedKinds !== kinds().join() || (old && wanted.untilMs === null)) {
+      if (stands(wanted)) asking = key;
+      else if (key !== asking || askedKinds !== kinds().join() || (old && wanted.untilMs === null)) {
         await load(wanted);
         asking = key;
       } else if (wanted.untilMs === null) await follow(wanted);
