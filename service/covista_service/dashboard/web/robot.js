@@ -27,7 +27,7 @@ export default {
     const valid = IS_ID.test(props.robot);
     const [words, report, pairs] = [shallowRef(null), shallowRef(null), shallowRef(null)];
     const [problem, unread] = [ref(""), ref("")];
-    const rates = reactive({ keyframes: null, poses: null });
+    const rates = reactive({ keyframes: null, poses: null, missing: null });
     const counted = new Rates();
     const aheadMs = ref(0);
 
@@ -45,8 +45,9 @@ export default {
         asked(rest(`/robots/${props.robot}`)),
         asked(rest(`/pairs?robot=${props.robot}&min_overlap=${LEAST}`)),
       ]);
-      counted.take({ keyframes: report.value.keyframes.received, poses: report.value.poses.received }, performance.now());
-      Object.assign(rates, { keyframes: counted.of("keyframes"), poses: counted.of("poses") });
+      const { keyframes, poses } = report.value;
+      counted.take({ keyframes: keyframes.received, poses: poses.received, missing: keyframes.missing + poses.missing }, performance.now());
+      for (const name of Object.keys(rates)) rates[name] = counted.of(name);
     }
 
     const events = shallowRef(null);

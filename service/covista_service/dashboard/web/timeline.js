@@ -127,24 +127,24 @@ export default {
           <template v-if="bands.thinned">So long a time is thinned: groups are looked at now and then, and short changes between are not drawn. Zoom in to see all.</template></p>
         <ul v-if="bands.gaps.length" class="cv-list"><li v-for="gap in bands.gaps" :key="gap.since_ms + gap.reason">
           <span>Hatched: from {{ spoken(gap.since_ms) }} to {{ spoken(gap.until_ms) }} something is missing: {{ gap.reason }}.</span></li></ul>
-        <div class="cv-timeline-then">
-          <section class="cv-card" aria-labelledby="cv-then">
-            <h2 id="cv-then">{{ heading }} <button v-if="shown.time !== null" @click="live">Back to now</button></h2>
-            <p v-if="unseen" class="cv-problem" role="alert">That time cannot be shown now: {{ unseen }}. Trying again.</p>
-            <p v-if="empty">{{ empty }}</p>
-            <p v-if="unheard">No robot was heard in the minutes before: where they were is not known, and the station may not have run.</p>
-            <ul class="cv-list cv-then-groups">
-              <li v-for="group in groups" :key="group.label"><group-mark :label="group.label"></group-mark>
-                <span><template v-for="(robot, k) in group.robots" :key="robot"><template v-if="k">, </template><a :href="page('/robots/' + robot)">{{ robot }}</a></template></span></li>
-              <li v-for="robot in missing" :key="robot.id"><group-mark :label="null"></group-mark>
-                <span><a :href="page('/robots/' + robot.id)">{{ robot.id }}</a> {{ REASONS[robot.reason] ?? 'stood in no group yet' }}</span></li>
-            </ul>
-            <small-matrix :frame="frame"></small-matrix>
-          </section>
-          <swarm-map :key="shown.time === null" :frame="frame" :chosen="chosen" @choose="choose"></swarm-map>
-          <event-list :events="events" :since-ms="bands.since_ms" :time="shown.time" :chosen="shown.show" :link-of="linkOf" @scrub="scrub"
-            @choose="shown.show = $event"></event-list>
-        </div>
       </template>
+      <div class="cv-timeline-then">
+        <section class="cv-card" aria-labelledby="cv-then">
+          <h2 id="cv-then">{{ heading }} <button v-if="shown.time !== null" @click="live">Back to now</button></h2>
+          <p v-if="unseen" class="cv-problem" role="alert">That time cannot be shown now: {{ unseen }}. Trying again.</p>
+          <p v-if="empty">{{ empty }}</p>
+          <p v-if="unheard">No robot was heard in the minutes before: where they were is not known, and the station may not have run.</p>
+          <ul class="cv-list cv-then-groups">
+            <li v-for="group in groups" :key="group.label"><group-mark :label="group.label"></group-mark>
+              <span><template v-for="(robot, k) in group.robots" :key="robot"><template v-if="k">, </template><a :href="page('/robots/' + robot)">{{ robot }}</a></template></span></li>
+            <li v-for="robot in missing" :key="robot.id"><group-mark :label="null"></group-mark>
+              <span><a :href="page('/robots/' + robot.id)">{{ robot.id }}</a> {{ REASONS[robot.reason] ?? 'stood in no group yet' }}</span></li>
+          </ul>
+          <small-matrix :frame="frame"></small-matrix>
+        </section>
+        <swarm-map :key="shown.time === null" :frame="frame" :chosen="chosen" @choose="choose"></swarm-map>
+        <event-list v-if="bands" :events="events" :since-ms="bands.since_ms" :time="shown.time" :chosen="shown.show" :link-of="linkOf" @scrub="scrub"
+          @choose="shown.show = $event"></event-list>
+      </div>
     </div>`,
 };

@@ -93,7 +93,7 @@ function drawRow(context, scale, runs, top, height, above, look, dark) {
     if (to < scale.sinceMs || label === "") continue;
     const left = Math.max(GUTTER, scale.px(from));
     // A gap where a label changes, but nothing vanishes for it.
-    const width = Math.max(1, scale.px(to) - left - (scale.px(to) - left > 3 ? 1.5 : 0));
+    const width = Math.max(1, scale.px(to) - left - (air && scale.px(to) - left > 3 ? 1.5 : 0));
     if (label === null) {
       context.fillStyle = look.none;
       context.fillRect(left, top + height / 2 - 1, width, Math.min(2, height));

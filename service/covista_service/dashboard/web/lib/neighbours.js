@@ -19,7 +19,8 @@ export default {
         .sort((p, q) => Math.max(q.own ?? 0, q.theirs ?? 0) - Math.max(p.own ?? 0, p.theirs ?? 0) || byName(p.name, q.name)),
     );
     const shown = computed(() => all.value.slice(0, MOST));
-    return { all, shown, page, ago, percent };
+    const predicted = computed(() => shown.value.some((each) => each.how === HOW.predicted));
+    return { all, shown, predicted, page, ago, percent };
   },
   template: `
     <section class="cv-card" aria-labelledby="cv-neighbours">
@@ -37,7 +38,7 @@ export default {
             <td><a :href="page('/pairs/' + robot + '/' + each.name)" :aria-label="'What ' + robot + ' and ' + each.name + ' both see'">{{ each.how }}</a><template v-if="each.ageS >= 1">, {{ ago(each.ageS) }} ago</template></td>
           </tr></tbody>
         </table>
-        <p class="cv-soft">Predicted: from what both have seen before, for where they look now.</p>
+        <p v-if="predicted" class="cv-soft">Predicted: from what both have seen before, for where they look now.</p>
         <p v-if="all.length > shown.length">and {{ all.length - shown.length }} more that share less.</p>
       </div>
     </section>`,

@@ -1,5 +1,5 @@
 // How often something comes, from a counter that is read now and then.
-const WINDOW_MS = 10000;
+const WINDOW_MS = 30000;
 
 export class Rates {
   constructor() {

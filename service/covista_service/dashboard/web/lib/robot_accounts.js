@@ -11,13 +11,17 @@ const MEANINGS = [
   ["waiting", "has come, and is not taken up yet"],
   ["dropped", "came and could not be used, for the reasons below"],
 ];
-const rate = (value) => (value === null ? "not known yet" : `${value < 9.95 ? value.toFixed(1) : Math.round(value)} a second`);
+function rate(value) {
+  if (value === null) return "not known yet";
+  if (value < 0.05) return value ? "less than 0.1 a second" : "none now";
+  return `${value < 9.95 ? value.toFixed(1) : Math.round(value)} a second`;
+}
 
 export default {
   props: {
     report: { type: Object, required: true },
     dropped: { type: Array, default: () => [] },
-    // Messages a second: { keyframes, poses }.
+    // Messages a second: { keyframes, poses, missing }.
     rates: { type: Object, required: true },
   },
   setup(props) {
@@ -36,6 +40,7 @@ export default {
       <dl class="cv-facts">
         <dt>Keyframes</dt><dd>{{ rate(rates.keyframes) }}</dd>
         <dt>Poses</dt><dd>{{ rate(rates.poses) }}</dd>
+        <dt>Missing</dt><dd :class="{ 'cv-problem': rates.missing > 0 }">{{ rate(rates.missing) }}</dd>
       </dl>
       <div class="cv-scroll" tabindex="0" role="group" aria-label="Accounts">
         <table class="cv-table">
