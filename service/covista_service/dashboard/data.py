@@ -11,7 +11,6 @@ from pydantic_core import to_json
 from covista_service.access import Door, Scope
 from covista_service.access.scopes import covers
 from covista_service.access.sessions import COOKIE
-from covista_service.dashboard import data_past, data_robot
 from covista_service.dashboard.sources import Sources, SourcesNow
 from covista_service.dashboard.why import why
 
@@ -19,8 +18,6 @@ JSON = "application/json"
 RobotQuery = Annotated[str, Query(pattern=f"^{ID_PATTERN}$")]
 
 router = APIRouter(prefix="/data", include_in_schema=False)
-router.include_router(data_past.router)
-router.include_router(data_robot.router)
 
 
 @router.get("/session")
@@ -32,7 +29,7 @@ async def session(request: Request, sources: SourcesNow) -> Response:
 @router.get("/swarm")
 async def swarm(sources: SourcesNow, matrix: Annotated[int | None, Query()] = None) -> Response:
     """The swarm now, for its map."""
-    return Response(sources.frames.swarm(sources.name, sources.loop.snapshot, matrix), media_type=JSON)
+    return Response(await sources.frames.swarm(sources.name, sources.loop.snapshot, matrix), media_type=JSON)
 
 
 @router.get("/why")

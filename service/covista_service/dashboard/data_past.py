@@ -20,7 +20,7 @@ _LATEST_MS = 253_370_764_800_000
 _LONGEST_S = 31 * 86_400
 MillisecondsQuery = Annotated[int | None, Query(ge=0, le=_LATEST_MS)]
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(prefix="/data", include_in_schema=False)
 
 
 @router.get("/past")

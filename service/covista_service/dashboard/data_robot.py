@@ -16,7 +16,7 @@ from covista_service.drawing import view as drawn
 from covista_service.station.snapshot import Snapshot
 
 RobotPath = Annotated[str, Path(pattern=f"^{ID_PATTERN}$")]
-router = APIRouter(prefix="/robots/{robot}", include_in_schema=False)
+router = APIRouter(prefix="/data/robots/{robot}", include_in_schema=False)
 
 
 async def _snapshot(sources: SourcesNow) -> Snapshot:

@@ -7,26 +7,13 @@ from typing import Any
 
 from covista_schemas.reports import Status
 
+from covista_service.dashboard.reasons import DROPPED, UNTOLD
 from covista_service.station.corrections import Correction
 from covista_service.station.events import Keyframe
 from covista_service.station.ledger import Counts
 from covista_service.station.options import NS_PER_S
 from covista_service.station.snapshot import RobotView, Snapshot
 
-# What the reasons mean; they are those of docs/rovers.md.
-MEANINGS = {
-    "malformed": "It is no message that the station can read.",
-    "wrong_id": "The id inside is not the one it was sent under, or no id.",
-    "bad_camera": "Focal length, size or distortion of the camera make no sense.",
-    "bad_pose": "Numbers of the pose are missing or not finite, or its quaternion is not of length one.",
-    "no_content": "It carries neither an image nor features.",
-    "bad_features": "Sizes of the features do not fit together, or points lie outside of the image.",
-    "unknown_descriptor": "The station does not know this kind of features.",
-    "bad_image": "The image cannot be read, is cut off, or is not as large as the camera says.",
-    "image_too_large": "The image claims more than 50 megapixels; it was not decoded.",
-    "too_large": "It is larger than the station takes (keyframes 4 MiB, poses 16 KiB); it was not read.",
-}
-_UNTOLD = "The station could not use it."
 _UNGROUPED = {"no_pose": "It has told no pose yet, so it stands in no group.", "gone": "So it stands in no group."}
 # A clock that is off by less is well set, as far as one can tell from messages that take some time.
 _CLOCK_S = 0.25
@@ -92,7 +79,7 @@ def dropped(view: RobotView) -> list[dict[str, Any]]:
 
 def _dropped(kind: str, counts: Counts) -> Iterator[dict[str, Any]]:
     for reason, count in counts.dropped.items():
-        yield {"of": kind, "reason": reason, "count": count, "meaning": MEANINGS.get(reason, _UNTOLD)}
+        yield {"of": kind, "reason": reason, "count": count, "meaning": DROPPED.get(reason, UNTOLD).means}
 
 
 def picture(keyframe: Keyframe | None) -> dict[str, Any]:

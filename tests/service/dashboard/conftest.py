@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from covista_schemas.reports import Group, GroupsReport, LiveSettings, Ungrouped, time_of
-from covista_service.dashboard import data
+from covista_service.dashboard import data, data_past, data_robot
 from covista_service.dashboard.sources import Sources
 from covista_service.store.database import open_engine
 from covista_service.store.migrations import upgrade
@@ -62,7 +62,8 @@ class PagesDesk(Desk):
         self.engine = open_engine(self.database)
         with self.engine.begin() as connection:
             upgrade(connection)
-        self.app.include_router(data.router, prefix="/dashboard")
+        for part in (data, data_past, data_robot):
+            self.app.include_router(part.router, prefix="/dashboard")
         parts = self.parts
         self.sources = Sources(
             parts.name, parts.loop, parts.telemetry, parts.health, parts.vitals, parts.gate, parts.archive

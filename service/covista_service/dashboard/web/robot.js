@@ -7,8 +7,8 @@ import { msOf, spoken } from "covista/moments.js";
 import Neighbours from "covista/neighbours.js";
 import { newestEvents } from "covista/past_asking.js";
 import { pulse } from "covista/pulse.js";
-import { Rates } from "covista/rates.js";
 import RobotAccounts from "covista/robot_accounts.js";
+import { Samples } from "covista/samples.js";
 
 const [EVERY_MS, EVENTS_MS, FORGOTTEN_MS, SOON_MS] = [1000, 5000, 5000, 100];
 const WEEK_MS = 604800000;
@@ -28,7 +28,7 @@ export default {
     const [words, report, pairs] = [shallowRef(null), shallowRef(null), shallowRef(null)];
     const [problem, unread] = [ref(""), ref("")];
     const rates = reactive({ keyframes: null, poses: null, missing: null });
-    const counted = new Rates();
+    const counted = new Samples();
     const aheadMs = ref(0);
 
     async function look() {
@@ -46,8 +46,12 @@ export default {
         asked(rest(`/pairs?robot=${props.robot}&min_overlap=${LEAST}`)),
       ]);
       const { keyframes, poses } = report.value;
-      counted.take({ keyframes: keyframes.received, poses: poses.received, missing: keyframes.missing + poses.missing }, performance.now());
-      for (const name of Object.keys(rates)) rates[name] = counted.of(name);
+      const sent = { keyframes: keyframes.received, poses: poses.received, missing: keyframes.missing + poses.missing };
+      counted.take({ station: found.station, ...sent }, performance.now());
+      for (const name of Object.keys(rates)) {
+        const aMinute = counted.rate((answer) => answer[name]);
+        rates[name] = aMinute === null ? null : aMinute / 60;
+      }
     }
 
     const events = shallowRef(null);

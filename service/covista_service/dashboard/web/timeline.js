@@ -116,7 +116,7 @@ export default {
           <button :disabled="untilMs === null" @click="shift(0.5)">Later</button>
         </div>
         <span class="cv-soft">{{ length(shown.span) }} are shown</span>
-        <button class="cv-live" :class="{ 'cv-main-action': untilMs !== null }" :aria-pressed="untilMs === null" @click="live">Live</button>
+        <button class="cv-to-now" :class="{ 'cv-main-action': untilMs !== null }" :aria-pressed="untilMs === null" @click="live">Live</button>
       </div>
       <p v-if="problem" class="cv-problem" role="alert">The past cannot be shown now: {{ problem }}. Trying again.</p>
       <p v-if="!bands && !problem">Asking the station.</p>
