@@ -24,6 +24,8 @@ _MOMENTS = 300
 _MOST_GAPS = 100
 # Of so many robots at most the order is the best that there is.
 _FEW = 120
+# Who were together for so much of their time stand in the order of names.
+_ALIKE = 0.98
 _MS = 1_000_000
 # In the place of a label, for a robot that was not known then.
 ABSENT = ""
@@ -102,9 +104,15 @@ def order(runs: dict[str, list[tuple[int, str | None]]], until_ms: int) -> list[
     apart += 1e-6 * np.abs(places[:, None] - places[None, :])
     tree = linkage(squareform(apart, checks=False), "average", optimal_ordering=len(robots) <= _FEW)
     leaves = leaves_list(tree)
-    if leaves[0] > leaves[-1]:
-        leaves = leaves[::-1]
-    return [robots[k] for k in leaves]
+    blocks: list[list[int]] = []
+    for k in leaves.tolist():
+        if blocks and together[blocks[-1][0], k] >= _ALIKE:
+            blocks[-1].append(k)
+        else:
+            blocks.append([k])
+    if min(blocks[0]) > min(blocks[-1]):
+        blocks.reverse()
+    return [robots[k] for block in blocks for k in sorted(block)]
 
 
 def _thinned(archive: Archive, since_ns: int, until_ns: int, first: list[GroupsReport]) -> Revisions:

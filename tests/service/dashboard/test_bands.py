@@ -117,10 +117,9 @@ def test_gaps_come_with_their_reason_once(pages_desk: PagesDesk, monkeypatch: py
 def test_robots_that_are_together_stand_together() -> None:
     names = ["r1", "r2", "r3", "r10", "r20", "r30"]
     runs: Runs = {name: [(0, f"g{1 + k % 2}")] for k, name in enumerate(names)}
-    found = order(runs, 1000)
-    assert sorted(found) == sorted(names)
-    labels = [runs[name][0][1] for name in found]
-    assert sum(first != second for first, second in pairwise(labels)) == 1
+    assert order(runs, 1000) == ["r1", "r3", "r20", "r2", "r10", "r30"]
+    # Who came a little later than the others is no stranger for it.
+    assert order(runs | {"r3": [(5, "g1")]}, 1000) == ["r1", "r3", "r20", "r2", "r10", "r30"]
 
 
 @pytest.mark.parametrize("names", [[], ["r1"], ["r10", "r2"], ["r10", "r9", "r1"]])
