@@ -11,6 +11,7 @@ from pydantic_core import to_json
 from covista_service.access import Door, Scope
 from covista_service.access.scopes import covers
 from covista_service.access.sessions import COOKIE
+from covista_service.dashboard.pair_facts import pair_facts
 from covista_service.dashboard.sources import Sources, SourcesNow
 from covista_service.dashboard.why import why
 
@@ -36,6 +37,12 @@ async def swarm(sources: SourcesNow, matrix: Annotated[int | None, Query()] = No
 async def reasons(sources: SourcesNow, a: RobotQuery, b: RobotQuery) -> Response:
     """Why two robots are in one group, or are not."""
     return answer({"sentences": why(sources.loop.snapshot(), a, b)})
+
+
+@router.get("/pair")
+async def pair(sources: SourcesNow, a: RobotQuery, b: RobotQuery) -> Response:
+    """What is known of two robots, as often as a mouse moves."""
+    return answer(pair_facts(sources.loop.snapshot(), a, b))
 
 
 def answer(found: object) -> Response:
