@@ -15,8 +15,10 @@ from covista_service.answers.pairs import (
     explaining_survey,
     find_pair,
     pair_report,
+    pair_view_report,
     pairs_report,
 )
+from covista_service.answers.pictures import pair_picture
 from covista_service.answers.pieces import pairs_json, similarity_json
 from covista_service.answers.robots import find_robot, robot_report, robots_report
 from covista_service.answers.settings import changes, grouping_options, live_settings
@@ -41,7 +43,9 @@ __all__ = [
     "matrix_csv",
     "matrix_npy",
     "own_group_report",
+    "pair_picture",
     "pair_report",
+    "pair_view_report",
     "pairs_json",
     "pairs_page",
     "pairs_report",

@@ -68,7 +68,11 @@ def find_pair(snapshot: Snapshot, a: str, b: str) -> PairView:
 
 def pair_report(snapshot: Snapshot, a: str, b: str) -> reports.PairReport:
     """A pair in the order asked for. Raises NotKnownError."""
-    view = find_pair(snapshot, a, b)
+    return pair_view_report(find_pair(snapshot, a, b), a)
+
+
+def pair_view_report(view: PairView, a: str) -> reports.PairReport:
+    """A pair of a snapshot with robot `a`, one of the two, as the first."""
     first: Literal["a", "b"] = "a" if view.a == a else "b"
     planes, regions = _planes(view), common_regions(view)
     if first == "b":

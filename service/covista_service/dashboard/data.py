@@ -11,7 +11,7 @@ from pydantic_core import to_json
 from covista_service.access import Door, Scope
 from covista_service.access.scopes import covers
 from covista_service.access.sessions import COOKIE
-from covista_service.dashboard.pair_facts import pair_facts
+from covista_service.dashboard.data_pairs import router as pairs_router
 from covista_service.dashboard.sources import Sources, SourcesNow
 from covista_service.dashboard.why import why
 
@@ -19,6 +19,7 @@ JSON = "application/json"
 RobotQuery = Annotated[str, Query(pattern=f"^{ID_PATTERN}$")]
 
 router = APIRouter(prefix="/data", include_in_schema=False)
+router.include_router(pairs_router)
 
 
 @router.get("/session")
@@ -37,12 +38,6 @@ async def swarm(sources: SourcesNow, matrix: Annotated[int | None, Query()] = No
 async def reasons(sources: SourcesNow, a: RobotQuery, b: RobotQuery) -> Response:
     """Why two robots are in one group, or are not."""
     return answer({"sentences": why(sources.loop.snapshot(), a, b)})
-
-
-@router.get("/pair")
-async def pair(sources: SourcesNow, a: RobotQuery, b: RobotQuery) -> Response:
-    """What is known of two robots, as often as a mouse moves."""
-    return answer(pair_facts(sources.loop.snapshot(), a, b))
 
 
 def answer(found: object) -> Response:

@@ -12,6 +12,7 @@ from fastapi import Depends, Request
 from covista_service.access import Gate
 from covista_service.answers.past import Archive
 from covista_service.dashboard.frames import Frames
+from covista_service.dashboard.looks import Looks
 from covista_service.loop import Loop
 from covista_service.loop.vitals import Vitals
 from covista_service.telemetry import Telemetry
@@ -29,6 +30,7 @@ class Sources:
     gate: Gate
     archive: Archive
     frames: Frames = field(default_factory=Frames)
+    looks: Looks = field(default_factory=Looks)
 
 
 class State(TypedDict):
