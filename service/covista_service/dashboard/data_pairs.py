@@ -9,6 +9,7 @@ from covista_schemas.keys import ID_PATTERN
 from fastapi import APIRouter, Query, Response
 from pydantic_core import to_json
 
+from covista_service.answers import NotKnownError
 from covista_service.dashboard.pair_facts import pair_facts
 from covista_service.dashboard.sources import SourcesNow
 from covista_service.station.options import NS_PER_S
@@ -21,8 +22,15 @@ router = APIRouter(prefix="/pair")
 
 @router.get("")
 async def facts(sources: SourcesNow, a: _RobotQuery, b: _RobotQuery) -> Response:
-    """What is known of two robots, as often as a mouse moves."""
-    return Response(to_json(pair_facts(sources.loop.snapshot(), a, b)), media_type=_JSON)
+    """What is known of two robots, as often as a mouse moves; a `problem` where they are no pair.
+
+    That is no error, of which browsers would complain each second that somebody looks at a robot that is not there.
+    """
+    try:
+        told = pair_facts(sources.loop.snapshot(), a, b)
+    except NotKnownError as error:
+        told = {"a": a, "b": b, "problem": error.detail}
+    return Response(to_json(told), media_type=_JSON)
 
 
 @router.get("/look")

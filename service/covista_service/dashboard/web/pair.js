@@ -24,7 +24,7 @@ export default {
       if (odd !== undefined) return `No robot can be called ${odd}: names are of small letters, digits, - and _.`;
       return props.a === props.b ? `${props.a} makes no pair with itself. Choose another robot.` : "";
     });
-    const { facts, refused } = usePairFacts(pair);
+    const { facts, problem } = usePairFacts(pair);
 
     const names = shallowRef([]);
     pulse(tagged(rest("/groups"), ({ groups, ungrouped }) => {
@@ -43,7 +43,7 @@ export default {
     const options = (mine) => (names.value.includes(mine) ? names.value : [mine, ...names.value]);
 
     const wanted = ref("told");
-    const { look, sinceS } = usePairLook(pair, wanted);
+    const { look, sinceS } = usePairLook(pair, wanted, computed(() => facts.value !== null));
     const moment = computed(() => {
       if (!look.value || sinceS.value === null) return "";
       if (wanted.value === "held") return "Held: what has come since is not in the pictures.";
@@ -64,7 +64,7 @@ export default {
       const why = facts.value?.why_not;
       return why ? `None. ${why}` : "None in these keyframes: nothing was matched in both images yet. The overlap is predicted.";
     });
-    return { facts, refused, wrong, before, after, go, options, wanted, look, moment, none, sides, page, ago };
+    return { facts, problem, wrong, before, after, go, options, wanted, look, moment, none, sides, page, ago };
   },
   template: `
     <div class="cv-pair">
@@ -79,8 +79,8 @@ export default {
       </nav>
       <p v-if="wrong" class="cv-problem" role="alert">{{ wrong }}</p>
       <template v-else>
-        <p v-if="refused" class="cv-problem" role="alert">{{ refused.message }}. It has not been heard yet, or has been forgotten. <a :href="page('/')">To the robots that are known</a></p>
-        <div class="cv-pictures" v-if="!refused">
+        <p v-if="problem" class="cv-problem" role="alert">The station says: {{ problem }}. It has not been heard yet, or has been forgotten. <a :href="page('/')">To the robots that are known</a></p>
+        <div class="cv-pictures" v-if="!problem">
           <pair-picture v-for="each in sides" :key="each.side" :picture="each.picture" :kind="each.robot?.picture"
             :words="'The keyframe of ' + each.name + '; what ' + each.other + ' sees of it is bright, the rest dimmed'">
             <strong><a :href="page('/robots/' + each.name)">{{ each.name }}</a></strong>
@@ -89,7 +89,7 @@ export default {
             <span v-if="each.keyframe" class="cv-soft">keyframe {{ each.keyframe.sequence }} <span :title="'boot ' + each.keyframe.boot">of boot {{ each.keyframe.boot.slice(0, 8) }}</span></span>
           </pair-picture>
         </div>
-        <div v-if="look && !refused" class="cv-headed">
+        <div v-if="look && !problem" class="cv-headed">
           <p class="cv-legend">
             <span>bright: seen by both</span><span>dimmed: by this robot alone</span>
             <span><svg class="cv-swatch" viewBox="0 0 16 16" width="14" height="14" aria-hidden="true"><circle class="cv-point" cx="8" cy="8" r="6"></circle></svg> matched point on a plane</span>
@@ -99,7 +99,7 @@ export default {
           <p class="cv-pick"><span class="cv-soft">{{ moment }}</span> <label>Pictures <select v-model="wanted">
             <option value="told">with planes, if lately</option><option value="newest">the newest</option><option value="held">hold these</option></select></label></p>
         </div>
-        <div class="cv-known" v-if="!refused">
+        <div class="cv-known" v-if="!problem">
           <section class="cv-card" aria-labelledby="cv-facts">
             <h2 id="cv-facts">What is known</h2>
             <pair-brief v-if="facts" :facts="facts"></pair-brief>

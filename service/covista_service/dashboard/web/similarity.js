@@ -81,7 +81,7 @@ export default {
       const { robots, order } = matrix.value ?? { order: [] };
       return order.length > 1 ? [robots[order[0]], robots[order[1]]] : null;
     });
-    const { facts, refused } = usePairFacts(pair);
+    const { facts, problem: unpaired } = usePairFacts(pair);
     const spoken = ref("");
     const pick = (names_, aloud) => {
       chosen.value = names_;
@@ -104,7 +104,7 @@ export default {
       if (a && a !== b) location.assign(page(`/pairs/${a}/${b}`));
     };
     return {
-      kind, part, groups, matrix, names, many, missing, problem, pair, facts, refused, value, spoken, chosen, hovered,
+      kind, part, groups, matrix, names, many, missing, problem, pair, facts, unpaired, value, spoken, chosen, hovered,
       pick, pickSide, open, page, MATRICES, REASONS, FEW_MISSING,
     };
   },
@@ -141,7 +141,7 @@ export default {
               <option v-for="name in names" :key="name">{{ name }}</option></select></label>
           </p>
           <p v-if="pair[0] === pair[1]">A robot with itself: it sees all that it sees.</p>
-          <p v-else-if="refused" class="cv-problem">{{ refused.message }}</p>
+          <p v-else-if="unpaired" class="cv-problem">The station says: {{ unpaired }}.</p>
           <template v-else>
             <pair-brief v-if="facts" :facts="facts"></pair-brief>
             <p v-else class="cv-brief">Asking the station.</p>

@@ -10,37 +10,28 @@ const RESTS_MS = 90;
 export const isId = (name) => /^[a-z0-9][a-z0-9_-]{0,62}$/.test(name ?? "");
 
 // For `setup`. `pair` is a ref of [a, b] or null; gives the facts of these two alone (null before they are there), and
-// what the station says instead where it refuses.
+// why they are no pair for the station.
 export function usePairFacts(pair) {
   const facts = shallowRef(null);
-  const refused = ref(null);
+  const problem = ref("");
   let timer = null;
 
   async function ask() {
     const [a, b] = pair.value ?? [];
     if (!isId(a) || !isId(b) || a === b) return;
-    const still = () => pair.value?.[0] === a && pair.value?.[1] === b;
-    try {
-      const found = await asked(data(`/pair?a=${a}&b=${b}`));
-      if (!still()) return;
-      facts.value = found;
-      refused.value = null;
-    } catch (error) {
-      if (still() && error.status) {
-        facts.value = null;
-        refused.value = error;
-      }
-      throw error;
-    }
+    const found = await asked(data(`/pair?a=${a}&b=${b}`));
+    if (pair.value?.[0] !== a || pair.value?.[1] !== b) return;
+    problem.value = found.problem ?? "";
+    facts.value = found.problem ? null : found;
   }
 
   watch(pair, (now, before) => {
     if (String(now) === String(before)) return;
     if (facts.value?.a !== now?.[0] || facts.value?.b !== now?.[1]) facts.value = null;
-    refused.value = null;
+    problem.value = "";
     clearTimeout(timer);
     timer = setTimeout(() => ask().catch(() => {}), RESTS_MS);
   });
   pulse(ask, EVERY_MS);
-  return { facts, refused };
+  return { facts, problem };
 }

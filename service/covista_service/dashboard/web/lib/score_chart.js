@@ -43,11 +43,14 @@ export default {
         words: `${groups}: ${score.toFixed(3)}`,
       }));
       const few = dots.length <= FEW && last - first < FEW;
+      // Of many numbers a line tells enough, and what matters lies on top.
+      const weight = (dot) => dot.shown + dot.best;
+      const marked = dots.filter((dot) => few || weight(dot)).sort((p, q) => weight(p) - weight(q));
       return {
-        dots, few, ticks: ticksOf(bottom, top).map((value) => ({ value, y: y(value) })), zero: y(0),
+        dots: marked, few, ticks: ticksOf(bottom, top).map((value) => ({ value, y: y(value) })), zero: y(0),
         path: few ? "" : "M" + dots.map((dot) => `${dot.x.toFixed(1)} ${dot.y.toFixed(1)}`).join("L"),
         numbers: few ? numbers.map((value) => ({ value, x: x(value) })) : ticksOf(first, last).filter((value) => value >= first && Number.isInteger(value)).map((value) => ({ value, x: x(value) })),
-        mark: dots.find((dot) => dot.shown),
+        mark: marked.find((dot) => dot.shown),
       };
     });
     const words = computed(() => {
@@ -70,7 +73,7 @@ export default {
           <title>{{ dot.words }}</title>
           <line v-if="chart.few" class="cv-stem" :class="{ 'cv-shown': dot.shown }" :x1="dot.x" :x2="dot.x" :y1="dot.zero" :y2="dot.y"></line>
           <circle class="cv-dot" :class="{ 'cv-shown': dot.shown, 'cv-best': dot.best }" :cx="dot.x" :cy="dot.y"
-            :r="dot.shown || dot.best ? 6 : chart.few ? 4 : 2"></circle>
+            :r="dot.shown || dot.best ? 6 : 4"></circle>
         </g>
         <text v-if="chart.mark" class="cv-label" :x="Math.min(width - 46, Math.max(LEFT + 24, chart.mark.x))" :y="Math.max(14, chart.mark.y - 11)"
           text-anchor="middle">{{ chart.mark.groups }} shown</text>
