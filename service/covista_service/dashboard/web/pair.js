@@ -35,6 +35,7 @@ export default {
       const others = names.value.filter((name) => name !== props.a);
       if (others.length < 2) return null;
       const at = others.indexOf(props.b);
+      if (at < 0) return others.at(step < 0 ? -1 : 0);
       return others[(at + step + others.length) % others.length];
     };
     const before = computed(() => beside(-1));
@@ -47,8 +48,8 @@ export default {
     const moment = computed(() => {
       if (!look.value || sinceS.value === null) return "";
       if (wanted.value === "held") return "Held: what has come since is not in the pictures.";
-      const since = sinceS.value < 1 ? "now" : `${ago(sinceS.value)} ago`;
-      return look.value.explained ? `Both images told planes ${since}.` : "The newest keyframes.";
+      if (!look.value.explained) return "Of the newest keyframes, without planes.";
+      return sinceS.value < 2 ? "Of the newest keyframes, with planes." : `Of ${ago(sinceS.value)} ago: newer keyframes have no planes yet.`;
     });
     const sides = computed(() =>
       ["a", "b"].map((side, k) => {

@@ -67,6 +67,11 @@ export default {
       };
     });
     const names = computed(() => [...(told.value?.robots ?? [])].sort(byName));
+    // Those of the matrix, and whoever else can be asked for.
+    const known = computed(() => {
+      const others = (groups.value?.ungrouped ?? []).map(({ robot }) => robot);
+      return [...new Set([...names.value, ...others, ...(chosen.value ?? [])])].sort(byName);
+    });
     const many = computed(() => names.value.length > MANY);
     watch([() => groups.value, part], () => {
       const labels = groups.value?.groups.map(({ label }) => label) ?? [];
@@ -95,7 +100,8 @@ export default {
     // What the matrix itself has of the pair: there at once.
     const value = computed(() => {
       const [a, b] = (pair.value ?? []).map((name) => told.value?.robots.indexOf(name) ?? -1);
-      if (!(a >= 0 && b >= 0) || told.value.kind !== kind.value) return null;
+      if (told.value?.kind !== kind.value) return null;
+      if (!(a >= 0 && b >= 0)) return "not known";
       const found = told.value.values[a * told.value.robots.length + b];
       return Number.isNaN(found) ? "not known" : matrix.value.measure.text(found);
     });
@@ -104,7 +110,7 @@ export default {
       if (a && a !== b) location.assign(page(`/pairs/${a}/${b}`));
     };
     return {
-      kind, part, groups, matrix, names, many, missing, problem, pair, facts, unpaired, value, spoken, chosen, hovered,
+      kind, part, groups, matrix, known, many, missing, problem, pair, facts, unpaired, value, spoken, chosen, hovered,
       pick, pickSide, open, page, MATRICES, REASONS, FEW_MISSING,
     };
   },
@@ -120,14 +126,13 @@ export default {
         <p class="cv-soft">{{ MATRICES[kind].title }}.</p>
         <p v-if="problem" class="cv-problem" role="alert">{{ problem }}</p>
         <p v-if="!matrix">Asking the station.</p>
-        <p v-else-if="!matrix.order.length">No robot has told a pose yet, so there is nothing to compare.</p>
+        <p v-else-if="!matrix.order.length">{{ missing.length ? 'No robot is here that has told a pose' : 'No robot has been heard yet' }}, so there is nothing to compare.</p>
         <div v-show="matrix?.order.length">
           <scale-legend v-if="matrix" :measure="matrix.measure" :key="kind + matrix.measure.top"></scale-legend>
           <similarity-matrix :matrix="matrix" :chosen="pair" @hover="hovered = $event" @choose="pick" @open="open"></similarity-matrix>
           <matrix-table v-if="matrix" :matrix="matrix" :kind="MATRICES[kind].name" :robot="pair?.[0]"></matrix-table>
         </div>
-        <p v-if="missing.length" class="cv-missing"><strong>Not in it:</strong>
-          <span v-for="each in missing.slice(0, FEW_MISSING)" :key="each.robot"><a :href="page('/robots/' + each.robot)">{{ each.robot }}</a> {{ REASONS[each.reason] }}; </span>
+        <p v-if="missing.length" class="cv-missing"><strong>Not in it:</strong>{{ ' ' }}<span v-for="each in missing.slice(0, FEW_MISSING)" :key="each.robot"><a :href="page('/robots/' + each.robot)">{{ each.robot }}</a> {{ REASONS[each.reason] }}; </span>
           <span v-if="missing.length > FEW_MISSING">and {{ missing.length - FEW_MISSING }} more</span></p>
         <p class="cv-hidden" aria-live="polite">{{ spoken }}</p>
       </section>
@@ -136,9 +141,9 @@ export default {
           <h2 id="cv-pair">{{ pair[0] }} and {{ pair[1] }}: <span class="cv-value">{{ MATRICES[kind].name }} {{ value ?? '...' }}</span></h2>
           <p class="cv-pick">
             <label>Row <select :value="pair[0]" @change="pickSide('a', $event.target.value)">
-              <option v-for="name in names" :key="name">{{ name }}</option></select></label>
+              <option v-for="name in known" :key="name">{{ name }}</option></select></label>
             <label>Column <select :value="pair[1]" @change="pickSide('b', $event.target.value)">
-              <option v-for="name in names" :key="name">{{ name }}</option></select></label>
+              <option v-for="name in known" :key="name">{{ name }}</option></select></label>
           </p>
           <p v-if="pair[0] === pair[1]">A robot with itself: it sees all that it sees.</p>
           <p v-else-if="unpaired" class="cv-problem">The station says: {{ unpaired }}.</p>

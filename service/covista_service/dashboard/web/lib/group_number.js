@@ -39,7 +39,7 @@ export default {
     <section aria-labelledby="cv-number">
       <h2 id="cv-number">{{ heading }}</h2>
       <p v-if="!groups">Asking the station.</p>
-      <p v-else-if="!groups.scores.length">There are no groups yet: no robot has told a pose.</p>
+      <p v-else-if="!groups.scores.length">There are no groups: no robot is here that has told a pose.</p>
       <template v-else>
         <p v-for="sentence in sentences" :key="sentence">{{ sentence }}</p>
         <p v-if="groups.note" class="cv-note"><strong>Note:</strong> {{ groups.note }}.</p>

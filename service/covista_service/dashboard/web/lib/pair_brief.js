@@ -36,7 +36,7 @@ export default {
         <dt>Found</dt><dd>{{ facts.how }} {{ facts.why_not ?? (facts.inliers ? facts.inliers + ' matched points agree.' : '') }}</dd>
         <dt>Age</dt><dd>{{ facts.age_s === null ? 'nothing found yet' : ago(facts.age_s) }}</dd>
         <dt>Similarity</dt><dd>{{ number(facts.similarity) }} <span class="cv-soft">closeness {{ number(facts.closeness) }}</span></dd>
-        <dt>Distance</dt><dd>{{ facts.distance_m === null ? 'not known: no pose of one of them yet' : metres(facts.distance_m) }}</dd>
+        <dt>Distance</dt><dd>{{ facts.distance_m === null ? 'not known: one of them is gone, or has told no pose' : metres(facts.distance_m) }}</dd>
         <dt>Groups</dt><dd class="cv-members"><span v-for="robot in facts.robots" :key="robot.id">
           <a :href="page('/robots/' + robot.id)">{{ robot.id }}</a> <group-mark :label="robot.group"></group-mark></span></dd>
       </dl>
