@@ -1,7 +1,15 @@
+from __future__ import annotations
+
 import re
+from typing import TYPE_CHECKING, Any
 
 import pytest
-from playwright.sync_api import Page, expect
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+# Without it there is no browser, and nothing to test here.
+expect = pytest.importorskip("playwright.sync_api").expect
 
 FACTS = "#cv-facts"
 
@@ -104,10 +112,10 @@ def test_the_past_is_drawn_and_read_with_arrow_keys(page: Page) -> None:
     assert "minutes=60" in page.url
 
 
-def test_a_past_that_cannot_be_read_says_so_and_the_rest_stands(page: Page) -> None:
+def test_a_past_that_cannot_be_read_says_so_and_the_rest_stands(page: Page, browser: Browser, station: Any) -> None:
     a, b = partners(page)
-    # A page of its own: browsers call an answer of 503 an error.
-    other = page.context.new_page()
+    # Somebody else's page: browsers call an answer of 503 an error.
+    other = browser.new_page(base_url=station.url)
     problem = {"title": "History unavailable", "status": 503, "detail": "the history cannot be read: its file is gone"}
     other.route("**/history*", lambda route: route.fulfill(status=503, json=problem))
     opened(other, a, b)
