@@ -9,7 +9,16 @@ from covista_service.answers.grouping import (
 )
 from covista_service.answers.matrices import Matrix, matrix_csv, matrix_npy
 from covista_service.answers.pages import PAIR_CURSOR, ROBOT_CURSOR, pairs_page, robots_page
-from covista_service.answers.pairs import common_regions, explaining_survey, find_pair, pair_report, pairs_report
+from covista_service.answers.pairs import (
+    brief_pair_report,
+    common_regions,
+    explaining_survey,
+    find_pair,
+    pair_report,
+    pair_view_report,
+    pairs_report,
+)
+from covista_service.answers.pictures import pair_picture
 from covista_service.answers.pieces import pairs_json, similarity_json
 from covista_service.answers.robots import find_robot, robot_report, robots_report
 from covista_service.answers.settings import changes, grouping_options, live_settings
@@ -20,6 +29,7 @@ __all__ = [
     "ROBOT_CURSOR",
     "Matrix",
     "NotKnownError",
+    "brief_pair_report",
     "changes",
     "common_regions",
     "event_report",
@@ -33,7 +43,9 @@ __all__ = [
     "matrix_csv",
     "matrix_npy",
     "own_group_report",
+    "pair_picture",
     "pair_report",
+    "pair_view_report",
     "pairs_json",
     "pairs_page",
     "pairs_report",

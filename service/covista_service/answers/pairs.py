@@ -51,6 +51,12 @@ def pair_summary(view: PairView, least: float = 0.0) -> reports.PairSummary | No
     return reports.PairSummary.model_validate(_pair(view, "a")) if listed else None
 
 
+def brief_pair_report(snapshot: Snapshot, a: str, b: str) -> reports.PairSummary:
+    """A pair in the order asked for, without planes and regions, which take time. Raises NotKnownError."""
+    view = find_pair(snapshot, a, b)
+    return reports.PairSummary.model_validate(_pair(view, "a" if view.a == a else "b"))
+
+
 def find_pair(snapshot: Snapshot, a: str, b: str) -> PairView:
     """A pair of two robots, in the station's order. Raises NotKnownError."""
     find_robot(snapshot, a)
@@ -62,7 +68,11 @@ def find_pair(snapshot: Snapshot, a: str, b: str) -> PairView:
 
 def pair_report(snapshot: Snapshot, a: str, b: str) -> reports.PairReport:
     """A pair in the order asked for. Raises NotKnownError."""
-    view = find_pair(snapshot, a, b)
+    return pair_view_report(find_pair(snapshot, a, b), a)
+
+
+def pair_view_report(view: PairView, a: str) -> reports.PairReport:
+    """A pair of a snapshot with robot `a`, one of the two, as the first."""
     first: Literal["a", "b"] = "a" if view.a == a else "b"
     planes, regions = _planes(view), common_regions(view)
     if first == "b":

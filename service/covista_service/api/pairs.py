@@ -27,8 +27,6 @@ from covista_service.api.past import (
     read_past,
     span_ns,
 )
-from covista_service.drawing import CommonField, overlay
-from covista_service.station.snapshot import PairView
 
 router = APIRouter(prefix="/pairs", tags=["pairs"])
 
@@ -91,34 +89,5 @@ async def history(
 @router.get("/{a}/{b}/overlay.png", response_class=Response, responses={**_PICTURE, **describe(404)})
 def overlay_picture(a: RobotPath, b: RobotPath, snapshot: SnapshotNow, side: SideQuery = "a") -> Response:
     """The common field drawn in the keyframe of one side: what the other does not see is dimmed."""
-    drawn, other = (a, b) if side == "a" else (b, a)
-    return Response(_draw(answers.find_pair(snapshot, drawn, other), drawn, other), media_type="image/png")
-
-
-def _draw(view: PairView, drawn: str, other: str) -> bytes:
-    first = drawn == view.a
-    keyframe = view.keyframe_a if first else view.keyframe_b
-    if keyframe is None:
-        raise NotKnownError("No picture", f"what {drawn!r} and {other!r} have in common is not known yet")
-    if keyframe.features is None:
-        raise NotKnownError("No picture", f"{drawn!r} has sent no keyframe since this station started")
-    share = view.overlap_a if first else view.overlap_b
-    words = "unknown" if share is None else f"{share:.0%}"
-    caption = (
-        f"{drawn} #{keyframe.id.sequence}: {words} of it seen by {other} ({view.found_by}, {view.inliers} inliers)"
-    )
-    return overlay(keyframe, _common_field(view, first=first), caption)
-
-
-def _common_field(view: PairView, *, first: bool) -> CommonField | None:
-    regions = tuple(answers.common_regions(view)[0 if first else 1])
-    survey = answers.explaining_survey(view)
-    if survey is None:
-        # Views that cannot meet have nothing in common, and that is known.
-        return None if view.overlap_a is None else CommonField(regions)
-    return CommonField(
-        regions,
-        tuple(plane.region_first if first else plane.region_second for plane in survey.planes),
-        survey.points_first_px if first else survey.points_second_px,
-        tuple(survey.plane_of_point.tolist()),
-    )
+    drawn = a if side == "a" else b
+    return Response(answers.pair_picture(answers.find_pair(snapshot, a, b), drawn), media_type="image/png")

@@ -11,6 +11,7 @@ from pydantic_core import to_json
 from covista_service.access import Door, Scope
 from covista_service.access.scopes import covers
 from covista_service.access.sessions import COOKIE
+from covista_service.dashboard.data_pairs import router as pairs_router
 from covista_service.dashboard.sources import Sources, SourcesNow
 from covista_service.dashboard.why import why
 
@@ -18,6 +19,7 @@ JSON = "application/json"
 RobotQuery = Annotated[str, Query(pattern=f"^{ID_PATTERN}$")]
 
 router = APIRouter(prefix="/data", include_in_schema=False)
+router.include_router(pairs_router)
 
 
 @router.get("/session")

@@ -12,6 +12,7 @@ from fastapi import Depends, Request
 from covista_service.access import Gate
 from covista_service.answers.past import Archive
 from covista_service.dashboard.frames import Frames
+from covista_service.dashboard.looks import Looks
 from covista_service.dashboard.rounds import Rounds
 from covista_service.loop import Loop
 from covista_service.loop.rooms import Room
@@ -39,6 +40,7 @@ class Sources:
     listeners: Callable[[], int] = lambda: 0
     given_up: Callable[[], Mapping[str, int]] = dict
     rounds: Rounds = field(default_factory=Rounds)
+    looks: Looks = field(default_factory=Looks)
 
 
 class State(TypedDict):

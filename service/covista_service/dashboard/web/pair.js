@@ -1,1 +1,119 @@
-export default { template: "<p></p>" };
+// Two robots: both keyframes with the common field, what is known of it, the planes behind it, and how it was before.
+import { computed, ref, shallowRef } from "vue";
+import { page, rest, tagged } from "covista/ask.js";
+import { ago, byName } from "covista/looks.js";
+import { isId, usePairFacts } from "covista/pair_facts.js";
+import { usePairLook } from "covista/pair_look.js";
+import { pulse } from "covista/pulse.js";
+import GroupMark from "covista/group_mark.js";
+import PairBrief from "covista/pair_brief.js";
+import PairHistory from "covista/pair_history.js";
+import PairPicture from "covista/pair_picture.js";
+import PlanesTable from "covista/planes_table.js";
+
+const NAMES_MS = 3000;
+
+export default {
+  components: { GroupMark, PairBrief, PairHistory, PairPicture, PlanesTable },
+  props: { a: String, b: String },
+  setup(props) {
+    const pair = computed(() => [props.a, props.b]);
+    // What is wrong with the address itself.
+    const wrong = computed(() => {
+      const odd = pair.value.find((name) => !isId(name));
+      if (odd !== undefined) return `No robot can be called ${odd}: names are of small letters, digits, - and _.`;
+      return props.a === props.b ? `${props.a} makes no pair with itself. Choose another robot.` : "";
+    });
+    const { facts, problem } = usePairFacts(pair);
+
+    const names = shallowRef([]);
+    pulse(tagged(rest("/groups"), ({ groups, ungrouped }) => {
+      names.value = [...groups.flatMap((group) => group.robots), ...ungrouped.map((each) => each.robot)].sort(byName);
+    }), NAMES_MS);
+    // Who comes before and after b, beside a.
+    const beside = (step) => {
+      const others = names.value.filter((name) => name !== props.a);
+      if (others.length < 2) return null;
+      const at = others.indexOf(props.b);
+      if (at < 0) return others.at(step < 0 ? -1 : 0);
+      return others[(at + step + others.length) % others.length];
+    };
+    const before = computed(() => beside(-1));
+    const after = computed(() => beside(1));
+    const go = (a, b) => location.assign(page(`/pairs/${a}/${b}`));
+    const options = (mine) => (names.value.includes(mine) ? names.value : [mine, ...names.value]);
+
+    const wanted = ref("told");
+    const { look, sinceS } = usePairLook(pair, wanted, computed(() => facts.value !== null));
+    const moment = computed(() => {
+      if (!look.value || sinceS.value === null) return "";
+      if (wanted.value === "held") return "Held: what has come since is not in the pictures.";
+      if (!look.value.explained) return "Of the newest keyframes, without planes.";
+      return sinceS.value < 2 ? "Of the newest keyframes, with planes." : `Of ${ago(sinceS.value)} ago: newer keyframes have no planes yet.`;
+    });
+    const sides = computed(() =>
+      ["a", "b"].map((side, k) => {
+        const [name, other] = k ? [props.b, props.a] : [props.a, props.b];
+        const keyframe = look.value?.pair.keyframes?.[side];
+        return { side, name, other, keyframe, robot: facts.value?.robots[k], picture: look.value?.pictures[k] };
+      }),
+    );
+    // Why there are no planes.
+    const none = computed(() => {
+      if (!look.value) return "Asking the station.";
+      if (!look.value.pair.keyframes) return "None: what both see is not known yet.";
+      const why = facts.value?.why_not;
+      return why ? `None. ${why}` : "None in these keyframes: nothing was matched in both images yet. The overlap is predicted.";
+    });
+    return { facts, problem, wrong, before, after, go, options, wanted, look, moment, none, sides, page, ago };
+  },
+  template: `
+    <div class="cv-pair">
+      <nav class="cv-pick cv-card" aria-label="Pairs">
+        <label>What <select :value="a" @change="go($event.target.value, b === $event.target.value ? a : b)">
+          <option v-for="name in options(a)" :key="name">{{ name }}</option></select></label>
+        <label>and <select :value="b" @change="go(a === $event.target.value ? b : a, $event.target.value)">
+          <option v-for="name in options(b)" :key="name">{{ name }}</option></select> both see</label>
+        <a :href="page('/pairs/' + b + '/' + a)">swap</a>
+        <span class="cv-turn"><a v-if="before" rel="prev" :href="page('/pairs/' + a + '/' + before)">← {{ a }} and {{ before }}</a>
+        <a v-if="after" rel="next" :href="page('/pairs/' + a + '/' + after)">{{ a }} and {{ after }} →</a></span>
+      </nav>
+      <p v-if="wrong" class="cv-problem" role="alert">{{ wrong }}</p>
+      <template v-else>
+        <p v-if="problem" class="cv-problem" role="alert">The station says: {{ problem }}. It has not been heard yet, or has been forgotten. <a :href="page('/')">To the robots that are known</a></p>
+        <div class="cv-pictures" v-if="!problem">
+          <pair-picture v-for="each in sides" :key="each.side" :picture="each.picture" :kind="each.robot?.picture"
+            :words="'The keyframe of ' + each.name + '; what ' + each.other + ' sees of it is bright, the rest dimmed'">
+            <strong><a :href="page('/robots/' + each.name)">{{ each.name }}</a></strong>
+            <group-mark v-if="each.robot" :label="each.robot.group"></group-mark>
+            <span v-if="each.robot && each.robot.status !== 'live'" class="cv-alarm">{{ each.robot.status }}, silent for {{ ago(each.robot.silent_s) }}</span>
+            <span v-if="each.keyframe" class="cv-soft">keyframe {{ each.keyframe.sequence }} <span :title="'boot ' + each.keyframe.boot">of boot {{ each.keyframe.boot.slice(0, 8) }}</span></span>
+          </pair-picture>
+        </div>
+        <div v-if="look && !problem" class="cv-headed">
+          <p class="cv-legend">
+            <span>bright: seen by both</span><span>dimmed: by this robot alone</span>
+            <span><svg class="cv-swatch" viewBox="0 0 16 16" width="14" height="14" aria-hidden="true"><circle class="cv-point" cx="8" cy="8" r="6"></circle></svg> matched point on a plane</span>
+            <span><svg class="cv-swatch" viewBox="0 0 16 16" width="14" height="14" aria-hidden="true"><circle class="cv-point-off" cx="8" cy="8" r="6"></circle></svg> on none</span>
+            <span>tinted: planes, coloured as in the table</span>
+          </p>
+          <p class="cv-pick"><span class="cv-soft">{{ moment }}</span> <label>Pictures <select v-model="wanted">
+            <option value="told">with planes, if lately</option><option value="newest">the newest</option><option value="held">hold these</option></select></label></p>
+        </div>
+        <div class="cv-known" v-if="!problem">
+          <section class="cv-card" aria-labelledby="cv-facts">
+            <h2 id="cv-facts">What is known</h2>
+            <pair-brief v-if="facts" :facts="facts"></pair-brief>
+            <p v-else class="cv-brief">Asking the station.</p>
+          </section>
+          <section class="cv-card" aria-labelledby="cv-planes">
+            <h2 id="cv-planes">Planes that both see</h2>
+            <planes-table v-if="look?.pair.planes.length" :planes="look.pair.planes"></planes-table>
+            <p v-else>{{ none }}</p>
+            <p v-if="look?.pair.planes.length" class="cv-soft">In the world: normal · X + offset = 0. Points are the matched ones that lie on it.</p>
+          </section>
+        </div>
+        <pair-history :a="a" :b="b"></pair-history>
+      </template>
+    </div>`,
+};

@@ -1,0 +1,143 @@
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+# Without it there is no browser, and nothing to test here.
+expect = pytest.importorskip("playwright.sync_api").expect
+
+FACTS = "#cv-facts"
+
+
+def partners(page: Page) -> tuple[str, str]:
+    """Two robots of one group, or any two, of which both have sent keyframes."""
+    found = page.request.get("/api/v1/pairs").json()["pairs"]
+    seen = [pair for pair in found if pair["keyframes"]]
+    best = max(seen, key=lambda pair: (pair["found_by"] == "image", pair["overlap_a"]))
+    return best["a"], best["b"]
+
+
+def opened(page: Page, a: str, b: str) -> Page:
+    page.goto(f"/dashboard/pairs/{a}/{b}")
+    return page
+
+
+def test_both_pictures_stand_beside_each_other_with_what_is_known(page: Page) -> None:
+    a, b = partners(page)
+    opened(page, a, b)
+    pictures = page.locator(".cv-picture img")
+    expect(pictures).to_have_count(2)
+    page.wait_for_function(
+        "[...document.querySelectorAll('.cv-picture img')].every((each) => each.complete && each.naturalWidth > 300)"
+    )
+    expect(pictures.first).to_have_attribute("alt", re.compile(f"keyframe of {a}; what {b} sees"))
+    facts = page.locator("section", has=page.locator(FACTS))
+    expect(facts).to_contain_text(f"of {a}'s view is seen by {b}")
+    expect(facts).to_contain_text(f"of {b}'s view is seen by {a}")
+    expect(facts).to_contain_text("Distance")
+    expect(page.locator(".cv-picture figcaption").first).to_contain_text("keyframe")
+
+
+def test_planes_are_listed_with_points_where_pictures_show_them(page: Page) -> None:
+    a, b = partners(page)
+    with page.expect_response("**/data/pair/look*") as answered:
+        opened(page, a, b)
+    page.get_by_label("Pictures").select_option("held")
+    told = answered.value.json()
+    assert [picture["problem"] for picture in told["pictures"]] == [None, None]
+    section = page.locator("section", has=page.locator("#cv-planes"))
+    if told["pair"]["planes"]:
+        expect(section.locator("tbody tr")).to_have_count(len(told["pair"]["planes"]))
+    else:
+        expect(section).to_contain_text("None")
+
+
+def test_pictures_are_not_sent_again_while_they_are_the_same(page: Page) -> None:
+    a, b = partners(page)
+    opened(page, a, b)
+    expect(page.locator(".cv-picture img")).to_have_count(2)
+    first = page.request.get(f"/dashboard/data/pair/look?a={a}&b={b}").json()
+    again = page.request.get(f"/dashboard/data/pair/look?a={a}&b={b}&known={first['version']}").json()
+    assert "pictures" in first
+    assert ("pictures" in again) == (again["version"] != first["version"])
+
+
+def test_other_robots_are_chosen_and_the_neighbours_are_links(page: Page) -> None:
+    opened(page, "r1", "r2")
+    onward = page.locator("a[rel=next]")
+    expect(onward).to_contain_text("r1 and r3")
+    onward.click()
+    page.wait_for_url("**/dashboard/pairs/r1/r3")
+    page.get_by_role("combobox", name="and").select_option("r5")
+    page.wait_for_url("**/dashboard/pairs/r1/r5")
+    page.get_by_role("combobox", name="What").select_option("r5")
+    page.wait_for_url("**/dashboard/pairs/r5/r1")
+    expect(page.locator(".cv-picture figcaption").first).to_contain_text("r5")
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "words"),
+    [
+        ("r1", "nobody", "no robot 'nobody' is known"),
+        ("r1", "r1", "r1 makes no pair with itself"),
+        ("r1", "R%202", "No robot can be called R 2"),
+        ("r1", "%3Cb%3Ex", "No robot can be called <b>x"),
+    ],
+)
+def test_what_is_no_pair_has_a_sentence_instead(page: Page, a: str, b: str, words: str) -> None:
+    opened(page, a, b)
+    expect(page.get_by_role("alert")).to_contain_text(words)
+    expect(page.locator(".cv-picture")).to_have_count(0)
+
+
+def test_the_past_is_drawn_and_read_with_arrow_keys(page: Page) -> None:
+    a, b = partners(page)
+    opened(page, a, b)
+    for line in (".cv-line-chart .cv-line-a", ".cv-line-chart .cv-line-b"):
+        expect(page.locator(line)).to_have_attribute("d", re.compile(r"^M[\d.]+ [\d.]+H"))
+    chart = page.locator(".cv-line-chart svg")
+    chart.focus()
+    page.keyboard.press("ArrowLeft")
+    told = page.locator(".cv-moment")
+    expect(told).to_contain_text(f"{b} sees")
+    kept = page.request.get(f"/api/v1/pairs/{a}/{b}/history?limit=1000").json()["items"]
+    expect(told).to_contain_text(re.compile(r"\d+ %|unknown"))
+    assert kept
+    page.get_by_label("Last").select_option("60")
+    assert "minutes=60" in page.url
+
+
+def test_a_past_that_cannot_be_read_says_so_and_the_rest_stands(page: Page, browser: Browser, station: Any) -> None:
+    a, b = partners(page)
+    # Somebody else's page: browsers call an answer of 503 an error.
+    other = browser.new_page(base_url=station.url)
+    problem = {"title": "History unavailable", "status": 503, "detail": "the history cannot be read: its file is gone"}
+    other.route("**/history*", lambda route: route.fulfill(status=503, json=problem))
+    opened(other, a, b)
+    expect(other.get_by_role("alert")).to_contain_text("The past cannot be shown now: the history cannot be read")
+    expect(other.locator(FACTS)).to_be_visible()
+    expect(other.locator(".cv-picture img")).to_have_count(2)
+    other.close()
+
+
+def test_robots_that_are_gone_are_named_with_how_long(page: Page) -> None:
+    a, b = partners(page)
+    told = page.request.get(f"/dashboard/data/pair?a={a}&b={b}").json()
+    told["robots"][1] |= {"status": "gone", "silent_s": 300.0}
+    told["warnings"] = [f"{b} is gone, silent for 5 min: what is told of it is from before."]
+    page.route("**/data/pair?*", lambda route: route.fulfill(json=told))
+    opened(page, a, b)
+    expect(page.locator(".cv-picture .cv-alarm")).to_contain_text("gone, silent for 5 min")
+    expect(page.locator(".cv-warning")).to_contain_text(f"{b} is gone")
+
+
+def test_a_phone_shows_all_without_scrolling_sideways(page: Page) -> None:
+    page.set_viewport_size({"width": 390, "height": 844})
+    opened(page, *partners(page))
+    expect(page.locator(".cv-line-chart svg")).to_be_visible()
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
