@@ -8,6 +8,7 @@ from typing import Any
 from covista_schemas.reports import FoundBy, PairSummary, Status
 
 from covista_service.answers import brief_pair_report, find_pair, find_robot
+from covista_service.dashboard.robot_words import spoken
 from covista_service.grouping.similarity import closeness
 from covista_service.station.events import Keyframe
 from covista_service.station.options import NS_PER_S
@@ -63,9 +64,7 @@ def _likeness(snapshot: Snapshot, a: str, b: str) -> dict[str, float | None]:
 
 
 def _how(view: PairView) -> str:
-    if view.found_by is FoundBy.PREDICTED and view.outlooks is None and not view.overlap_a:
-        return _APART
-    return _HOW[view.found_by]
+    return _APART if view.apart else _HOW[view.found_by]
 
 
 def _presence(snapshot: Snapshot, robots: tuple[RobotView, RobotView]) -> Iterator[str]:
@@ -73,7 +72,7 @@ def _presence(snapshot: Snapshot, robots: tuple[RobotView, RobotView]) -> Iterat
         if robot.status is Status.LIVE:
             continue
         silent_s = _silent_s(snapshot, robot)
-        since = "" if silent_s is None else f", silent for {_length(silent_s)}"
+        since = "" if silent_s is None else f", silent for {spoken(silent_s)}"
         word = "is gone" if robot.status is Status.GONE else "is stale"
         yield f"{robot.id} {word}{since}: what is told of it is from before."
 
@@ -110,9 +109,3 @@ def _picture(keyframe: Keyframe) -> str | None:
 def _silent_s(snapshot: Snapshot, robot: RobotView) -> float | None:
     last_ns = robot.last_seen_ns
     return None if last_ns is None else round(max(0.0, (snapshot.wall_ns - last_ns) / NS_PER_S), 1)
-
-
-def _length(seconds: float) -> str:
-    if seconds < 90:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

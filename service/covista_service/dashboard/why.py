@@ -44,10 +44,10 @@ def _shared(pair: PairView, a: str, b: str) -> Iterator[str]:
     of_a, of_b = (pair.overlap_a, pair.overlap_b) if pair.a == a else (pair.overlap_b, pair.overlap_a)
     if of_a is None or of_b is None:
         yield "What both see is not known yet."
+    elif pair.apart:
+        yield "They see nothing in common: from where they stand their views cannot meet."
     elif max(of_a, of_b) == 0:
-        yield "They see nothing in common: " + (
-            "their views cannot meet." if pair.keyframe_a is None else f"{_HOW.get(pair.found_by, 'measured')}."
-        )
+        yield f"They see nothing in common ({_HOW.get(pair.found_by, 'measured')})."
     else:
         how = _HOW.get(pair.found_by, "measured")
         yield f"{b} sees {of_a:.0%} of {a}'s view, {a} sees {of_b:.0%} of {b}'s ({how})."

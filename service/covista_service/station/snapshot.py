@@ -110,6 +110,11 @@ class PairView:
     stands_for_ns: tuple[int, int] | None = None
 
     @property
+    def apart(self) -> bool:
+        """Whether they share nothing because their views cannot meet: nobody had to look for that."""
+        return self.overlap_a == 0 and self.overlap_b == 0 and self.outlooks is None
+
+    @property
     def inliers(self) -> int:
         """Matches that agreed with one geometry in the last survey."""
         return 0 if self.compared is None else int(self.compared.pose.inliers.sum())
