@@ -21,7 +21,8 @@ from tests.service.deadline import free_endpoint, wait_until
 from tests.system.certificates import Pair
 from tests.system.station_commands import COMMAND, environment
 
-READY_S = 100.0
+# A machine that has never run it compiles first.
+READY_S = 240.0
 
 
 @dataclass
