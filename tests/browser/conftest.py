@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from covista_service.access import Scope
 
 from tests.browser.stations import BrowsedStation, browsed_station
 from tests.browser.visitor import Visitor
@@ -22,6 +24,15 @@ if TYPE_CHECKING:
 _PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
 # For the first test of a worker, which waits for station and browser too.
 _PATIENCE_S = 400
+
+
+@dataclass(frozen=True)
+class LockedStation:
+    """A station that asks for tokens, and one of each scope."""
+
+    station: BrowsedStation
+    reader: str
+    operator: str
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -50,6 +61,13 @@ def station(chromium: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator
         yield running
 
 
+@pytest.fixture(scope="module")
+def locked(chromium: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[LockedStation]:
+    """A station that asks for tokens, without robots."""
+    with browsed_station(tmp_path_factory.mktemp("locked"), rovers=False) as running:
+        yield LockedStation(running, running.token("reader", Scope.READ), running.token("operator", Scope.OPERATE))
+
+
 # One a module: while it is there, its event loop is that of this thread, where other tests start their own.
 @pytest.fixture(scope="module")
 def browser(chromium: str) -> Iterator[Browser]:
@@ -68,6 +86,14 @@ def browser(chromium: str) -> Iterator[Browser]:
 def visitor(browser: Browser, station: BrowsedStation) -> Iterator[Visitor]:
     """Somebody who visits the shared station; at the end nothing may have gone wrong that was not allowed."""
     with Visitor(browser, station.url) as somebody:
+        yield somebody
+    assert not somebody.troubles
+
+
+@pytest.fixture
+def stranger(browser: Browser, locked: LockedStation) -> Iterator[Visitor]:
+    """Somebody who visits the locked station, held to the same."""
+    with Visitor(browser, locked.station.url) as somebody:
         yield somebody
     assert not somebody.troubles
 

@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import pytest
@@ -68,10 +69,9 @@ def test_a_group_change_is_seen_soon_after_it_was_published(page: Page, station:
             await_groups(page, 3 if change % 2 == 0 else 2)
             assert groups_shown(page) == [group.robots for group in control.groups().groups]
     in_order = sorted(late.values())
-    print(f"seen after {statistics.median(in_order):.2f} s, at most {in_order[-1]:.2f} s")
     assert len(in_order) == CHANGES
-    assert statistics.median(in_order) <= SOON_S
-    assert in_order[-1] <= LAW_S
+    assert statistics.median(in_order) <= SOON_S, in_order
+    assert in_order[-1] <= LAW_S, in_order
 
 
 def test_a_rover_that_leaves_and_comes_is_seen_on_the_page(page: Page, station: BrowsedStation) -> None:
@@ -82,7 +82,7 @@ def test_a_rover_that_leaves_and_comes_is_seen_on_the_page(page: Page, station: 
     page.locator("section[aria-labelledby=cv-missing]").get_by_text("r6").wait_for()
     station.rovers.come("r6")
     page.locator("section[aria-labelledby=cv-missing]").wait_for(state="detached")
-    assert sorted(sum(groups_shown(page), [])) == list(ROBOTS)
+    assert sorted(chain(*groups_shown(page))) == list(ROBOTS)
     station.settle()
 
 

@@ -8,7 +8,8 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from importlib.util import find_spec
 
-from fastapi import APIRouter, FastAPI
+from fastapi import APIRouter, FastAPI, Request, Response
+from fastapi.responses import RedirectResponse
 
 from covista_service.answers import NotKnownError
 from covista_service.dashboard.places import PREFIX
@@ -36,6 +37,10 @@ def add_pages(app: FastAPI) -> None:
         app.include_router(routes)
         return
     from covista_service.dashboard import data, log_in, serving
+
+    @routes.get("")
+    async def first(request: Request) -> Response:
+        return RedirectResponse(f"{request.scope.get('root_path', '')}{PREFIX}/")
 
     routes.include_router(data.router)
     routes.include_router(log_in.router)
