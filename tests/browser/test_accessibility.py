@@ -13,7 +13,7 @@ from tests.browser.visitor import PHONE, WIDE, Visitor
 
 pytest.importorskip("axe_playwright_python")
 
-from axe_playwright_python.sync_playwright import Axe  # noqa: E402 - not without it
+from axe_playwright_python.sync_playwright import Axe
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import re
 import signal
+import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+import psutil
 import pytest
 
 from tests.browser.pages import await_groups, groups_shown, notice, opened
 from tests.browser.stations import BrowsedStation, browsed_station
 from tests.browser.visitor import Visitor
+from tests.service.deadline import wait_until
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -19,6 +22,8 @@ if TYPE_CHECKING:
 # What a page that asks in vain cannot keep the browser from saying.
 AWAY = (r"ERR_CONNECTION_REFUSED", r"ERR_EMPTY_RESPONSE", r"ERR_CONNECTION_RESET", r"ERR_SOCKET_NOT_CONNECTED")
 FROZEN = (*AWAY, r"ERR_TIMED_OUT", r"WebSocket")
+
+STALLED_S, STALLED_MB = 20.0, 20.0
 
 
 @pytest.fixture(scope="module")
@@ -67,3 +72,33 @@ def test_a_station_that_hangs_is_said_to_be_away_and_then_to_be_there(guest: Vis
         own.signal(signal.SIGCONT)
     notice(page).wait_for(state="detached", timeout=30_000)
     await_groups(page, 2)
+
+
+def test_a_tab_that_stalls_costs_the_station_next_to_nothing_and_comes_back(
+    guest: Visitor, own: BrowsedStation, chromium: str
+) -> None:
+    """All of a browser is stopped, as a laptop is that is closed: it reads nothing, and hangs up nowhere."""
+    opened(guest.page(), "/dashboard/", "Swarm")
+    station, before = psutil.Process(own.pid), set(psutil.Process().children(recursive=True))
+    other = guest.browser.browser_type.launch(executable_path=chromium, args=["--no-sandbox"])
+    programs = [each for each in psutil.Process().children(recursive=True) if each not in before]
+    assert programs
+    with Visitor(other, own.url) as sleeper:
+        page = sleeper.page()
+        opened(page, "/dashboard/", "Swarm")
+        await_groups(page, 2)
+        held = station.memory_info().rss
+        for each in programs:
+            each.suspend()
+        try:
+            # Longer than the station waits for a socket's answer.
+            end_s = time.monotonic() + STALLED_S
+            wait_until(lambda: time.monotonic() > end_s, deadline_s=2 * STALLED_S)
+            grown_mb = (station.memory_info().rss - held) / 1e6
+        finally:
+            for each in programs:
+                each.resume()
+        assert grown_mb <= STALLED_MB
+        await_groups(page, 2)
+        page.wait_for_function("!document.querySelector('.cv-standing [role=status]')")
+    other.close()

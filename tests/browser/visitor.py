@@ -20,7 +20,7 @@ class Visitor:
     """
 
     def __init__(self, browser: Browser, url: str) -> None:
-        self._browser = browser
+        self.browser = browser
         self._url = url
         self._contexts: list[BrowserContext] = []
         self._allowed: list[re.Pattern[str]] = []
@@ -28,7 +28,7 @@ class Visitor:
 
     def page(self, *, dark: bool = False, size: dict[str, int] | None = None, **options: Any) -> Page:
         """A page of a browser with no cookies yet; `options` are those of a browser's context."""
-        context = self._browser.new_context(
+        context = self.browser.new_context(
             base_url=self._url,
             viewport=size or WIDE,  # type: ignore[arg-type]
             color_scheme="dark" if dark else "light",

@@ -221,13 +221,15 @@ def _session_of(headers: Headers) -> str:
 def _is_own_page(headers: Headers, *, asks: bool = False) -> bool:
     """Whether a browser asks because of a page of this station; one may come from anywhere to what it only `asks` for.
 
-    Browsers say so in Sec-Fetch-Site (Fetch Metadata), those of before 2023 in Origin alone.
+    Browsers say so in Sec-Fetch-Site (Fetch Metadata); those of before 2023, and all where the station is neither at
+    localhost nor behind TLS, in Origin alone.
     """
-    site = headers.get("sec-fetch-site", "same-origin")
     if asks and headers.get("sec-fetch-mode") == "navigate":
         return True
-    origin = headers.get("origin")
-    return site in ("same-origin", "none") and (origin is None or urlsplit(origin).netloc == headers.get("host"))
+    site, origin = headers.get("sec-fetch-site"), headers.get("origin")
+    if site is not None:
+        return site in ("same-origin", "none")
+    return origin is None or urlsplit(origin).netloc == headers.get("host")
 
 
 def _may_be_called(gate: Gate, host: str) -> bool:

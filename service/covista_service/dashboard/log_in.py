@@ -13,7 +13,7 @@ from fastapi.responses import HTMLResponse, RedirectResponse
 from covista_service.access import Door, Refusal, Refused
 from covista_service.access.sessions import COOKIE
 from covista_service.access.tokens import is_shaped
-from covista_service.dashboard.places import LOG_IN, PREFIX
+from covista_service.dashboard.places import LOG_IN, PREFIX, REFERRER
 from covista_service.dashboard.sources import SourcesNow
 
 router = APIRouter(include_in_schema=False)
@@ -109,7 +109,7 @@ def _sent_on(request: Request, path: str) -> Response:
 def _form(request: Request, back: str, problem: str = "", refused: Refused | None = None) -> Response:
     words = f'<p role="alert">{escape(problem)}</p>\n' if problem else ""
     text = _PAGE.format(root=escape(_root(request)), prefix=PREFIX, problem=words, back=escape(back))
-    headers = {"content-security-policy": _POLICY}
+    headers = {"content-security-policy": _POLICY, "referrer-policy": REFERRER}
     if refused is None:
         return HTMLResponse(text, HTTPStatus.OK, headers)
     if refused.retry_after_s:

@@ -19,7 +19,7 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from covista_service.dashboard import pages
-from covista_service.dashboard.places import FILES, PAGES, PREFIX
+from covista_service.dashboard.places import FILES, PAGES, PREFIX, REFERRER
 from covista_service.dashboard.sockets import bounded_sockets
 
 WEB = Path(__file__).parent / "web"
@@ -100,7 +100,9 @@ def _with_policy(app: ASGIApp) -> ASGIApp:
 
         async def sending(message: Message) -> None:
             if message["type"] == "http.response.start":
-                MutableHeaders(scope=message).setdefault("content-security-policy", _POLICY)
+                headers = MutableHeaders(scope=message)
+                headers.setdefault("content-security-policy", _POLICY)
+                headers.setdefault("referrer-policy", REFERRER)
             await send(message)
 
         await _served(scope, app)(scope, receive, sending)
