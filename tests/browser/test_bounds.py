@@ -71,8 +71,8 @@ def status_of(opened: socket.socket) -> int:
 
 def socket_path(page: str) -> str:
     """Where the socket of a page is, as its script asks for it."""
-    found = re.search(r'"?client_id"?: ?"([\w-]+)"', page.replace("&#34;", '"'))
-    assert found, page[-3000:]
+    found = re.search(r"'client_id': '([\w-]+)'", page)
+    assert found
     query = f"EIO=4&transport=websocket&client_id={found[1]}&next_message_id=0&implicit_handshake=true"
     return f"/dashboard/_nicegui_ws/socket.io/?{query}&tab_id={found[1]}&document_id={found[1]}"
 

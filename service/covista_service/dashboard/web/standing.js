@@ -1,5 +1,5 @@
 // At the top of every page: whether the station answers, light or dark, and the way out.
-import { computed, onMounted, ref } from "vue";
+import { computed, onMounted, ref, watch } from "vue";
 import { asked, data, heardOf, noteRestart, page, standing } from "covista/ask.js";
 import { pulse } from "covista/pulse.js";
 
@@ -24,6 +24,8 @@ export default {
       Quasar.Dark.set(dark);
       localStorage.setItem(DARK, dark);
     };
+    // Nothing is let in any more that this page would try again and again.
+    watch(() => standing.loggedOut, () => globalThis.socket?.disconnect());
     const words = computed(() => {
       if (standing.loggedOut) return "You are not logged in any more.";
       if (standing.lostSince !== null) {
