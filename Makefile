@@ -12,7 +12,7 @@ STACK := $(COMPOSE) --file docker/compose.yaml
 TESTS := $(BIN)/pytest --numprocesses=auto --maxprocesses=4 --dist=loadfile
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help demo test check api-test fuzz soak bench up down compose-test fault-test
+.PHONY: help demo test check api-test fuzz soak bench screenshots up down compose-test fault-test
 
 help: ## Say what there is to make
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1: \2/p' Makefile
@@ -57,6 +57,10 @@ bench: .venv/.dev ## The benchmarks, beside their peers
 	@echo "bench: every benchmark in its short form"
 	@exec $(BIN)/covista-station bench
 
+screenshots: .venv/.dev ## A picture of every page of the dashboard, into docs/pictures/dashboard
+	@echo "screenshots: a demo, and a picture of each of its pages, two minutes"
+	@$(BIN)/python -m tests.browser.screenshots
+
 up: ## Station and rovers as containers, in the background
 	@$(call need_engine)
 	@echo "up: building the images"
@@ -83,7 +87,7 @@ fault-test: .venv/.dev ## The faults five times, with a table of how soon each i
 # The stamps: what is installed was installed for this pyproject.toml.
 .venv/.demo: pyproject.toml | .venv/bin/python
 	@echo "Installing the station into .venv (a minute or two)"
-	@$(PIP) install --editable '.[station]'
+	@$(PIP) install --editable '.[station,dashboard]'
 	@$(call warm)
 	@touch $@
 

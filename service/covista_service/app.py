@@ -19,7 +19,9 @@ from covista_service.api.deps import Parts, State
 from covista_service.api.docs_page import DOCS
 from covista_service.api.stream import Stream
 from covista_service.config import Settings, with_stored
-from covista_service.dashboard import PAGES, Sources, add_pages, has_pages, opened
+from covista_service.dashboard.mounting import add_pages, opened
+from covista_service.dashboard.places import PAGES, has_pages
+from covista_service.dashboard.sources import Sources
 from covista_service.grouping.warming import warm_up
 from covista_service.link.admission import Lock
 from covista_service.link.inbox import Inbox
@@ -60,7 +62,15 @@ def create_app(settings: Settings) -> FastAPI:
     async def lifespan(_app: FastAPI) -> AsyncIterator[State]:
         async with _open_parts(settings) as parts, opened():
             sources = Sources(
-                parts.name, parts.loop, parts.telemetry, parts.health, parts.vitals, parts.gate, parts.archive
+                parts.name,
+                parts.loop,
+                parts.telemetry,
+                parts.health,
+                parts.vitals,
+                parts.gate,
+                parts.archive,
+                listeners=lambda: parts.stream.listeners,
+                given_up=lambda: parts.outgoing.given_up + parts.stream.given_up,
             )
             yield {"parts": parts, "dashboard": sources}
 

@@ -22,6 +22,7 @@ from covista_schemas.errors import CovistaError
 from fastapi import FastAPI
 from starlette.types import Receive, Scope, Send
 
+from covista_service import heaps
 from covista_service.access.certificates import Certificates
 from covista_service.api.connection import Connection
 from covista_service.api.deps import Parts
@@ -62,6 +63,7 @@ def run(settings: Settings, *, ready: Callable[[Running], None] | None = None, s
 
     In the main thread SIGINT and SIGTERM stop it too, unless `signals` is False.
     """
+    heaps.bound()
     app = create_app(settings)
     certificates = _certificates(settings)
     listener = _bind(settings.api_address)
@@ -109,11 +111,15 @@ async def _serve(
             running = Running(_url(settings, listener), settings.link, parts.telemetry.summary, server.stop)
             server.when_started = (lambda: ready(running)) if ready else _nothing
             server.when_stopping = parts.stream.close
-            settling = asyncio.create_task(_settle(parts), name="covista-settling")
+            beside = [
+                asyncio.create_task(_settle(parts), name="covista-settling"),
+                asyncio.create_task(heaps.keep_trim(), name="covista-heaps"),
+            ]
             try:
                 await server.serve([listener])
             finally:
-                settling.cancel()
+                for task in beside:
+                    task.cancel()
 
 
 def _server(stateful: Any, connection: Callable[..., Connection], certificates: Certificates | None) -> _Server:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import chain
 
 from covista_service.bench import (
+    dashboard,
     dense,
     group,
     group_costs,
@@ -44,10 +45,11 @@ BENCHES: Mapping[str, Sequence[Bench]] = {
     "history": (history.rows,),
     "restart": (restart.rows,),
     "sse": (sse.rows,),
+    "dashboard": (dashboard.rows,),
     "soak": (soak.rows,),
 }
-# What takes so long that it runs only when it is named.
-ON_REQUEST = frozenset({"soak"})
+# What takes long, or needs more than others, and so runs only when it is named.
+ON_REQUEST = frozenset({"dashboard", "soak"})
 
 
 class UnknownBenchError(ValueError):

@@ -3,11 +3,3 @@
 The pages are shells. What they show their scripts ask for: REST, with the same answers as everybody, and a few routes
 of our own for what only a page needs (`data`). Nothing is pushed, so a page that nobody reads costs nothing.
 """
-
-from __future__ import annotations
-
-from covista_service.dashboard.mounting import add_pages, has_pages, opened
-from covista_service.dashboard.places import PAGES
-from covista_service.dashboard.sources import Sources
-
-__all__ = ["PAGES", "Sources", "add_pages", "has_pages", "opened"]

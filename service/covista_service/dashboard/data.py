@@ -29,7 +29,7 @@ async def session(request: Request, sources: SourcesNow) -> Response:
 @router.get("/swarm")
 async def swarm(sources: SourcesNow, matrix: Annotated[int | None, Query()] = None) -> Response:
     """The swarm now, for its map."""
-    return Response(sources.frames.swarm(sources.name, sources.loop.snapshot, matrix), media_type=JSON)
+    return Response(await sources.frames.swarm(sources.name, sources.loop.snapshot, matrix), media_type=JSON)
 
 
 @router.get("/why")

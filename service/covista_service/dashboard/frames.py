@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,31 +26,69 @@ _DECIMALS_M, _DECIMALS_SHARE = 3, 3
 
 
 class Frames:
-    """Frames as JSON, made once for all who ask at the same time; for the thread of the event loop alone."""
+    """Frames as JSON, made once for all who ask at the same time, and in another thread; for one event loop alone."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
+        self._making = asyncio.Lock()
         self._made_s = -math.inf
-        self._swarm: dict[str, Any] = {}
+        self._swarm = b"{}"
         self._edges: tuple[int, bytes] = (-1, b"null")
+        self._rows = Rows()
 
-    def swarm(self, station: str, snapshot: Callable[[], Snapshot], matrix: int | None = None) -> bytes:
+    async def swarm(self, station: str, snapshot: Callable[[], Snapshot], matrix: int | None = None) -> bytes:
         """The swarm now; its edges too, unless they are those of the revision `matrix`, which who asks has."""
-        now_s = self._clock()
-        if now_s - self._made_s >= _FRESH_S:
-            found = snapshot()
-            self._swarm = {"station": station, **swarm_frame(found)}
-            if found.similarity.revision != self._edges[0]:
-                self._edges = found.similarity.revision, to_json(edges_of(found.similarity))
-            self._made_s = now_s
+        async with self._making:
+            if self._clock() - self._made_s >= _FRESH_S:
+                await asyncio.to_thread(self._make, station, snapshot())
+                self._made_s = self._clock()
         edges = b"null" if matrix == self._edges[0] else self._edges[1]
-        return b'%b,"edges":%b}' % (to_json(self._swarm)[:-1], edges)
+        return b'%b,"edges":%b}' % (self._swarm[:-1], edges)
+
+    def _make(self, station: str, found: Snapshot) -> None:
+        if found.similarity.revision != self._edges[0]:
+            self._edges = found.similarity.revision, to_json(edges_of(found.similarity))
+        self._swarm = to_json({"station": station, **swarm_frame(found, self._rows)})
 
 
-def swarm_frame(snapshot: Snapshot) -> dict[str, Any]:
+@dataclass(frozen=True, slots=True)
+class Row:
+    """What is told of a robot and stands as long as its view does: its place, and the corners of what it sees."""
+
+    at_m: list[float] | None
+    corners: list[float] | None
+    off_deg: float | None
+
+
+class Rows:
+    """Rows of robots; most have not changed since somebody asked last."""
+
+    def __init__(self) -> None:
+        self._held: dict[str, tuple[RobotView, Row]] = {}
+
+    def of(self, views: Sequence[RobotView]) -> list[Row]:
+        """A row for each, and no others are kept."""
+        held = {view.id: self._row(view) for view in views}
+        self._held = held
+        return [held[view.id][1] for view in views]
+
+    def _row(self, view: RobotView) -> tuple[RobotView, Row]:
+        known = self._held.get(view.id)
+        if known is not None and known[0] is view:
+            return known
+        fix, camera = view.fix, view.camera
+        return view, Row(
+            at_m=None if fix is None else rounded(fix.pose.centre_m),
+            corners=None if fix is None or camera is None else corners(camera, fix.pose),
+            off_deg=None if view.correction is None else round(view.correction.deg, 1),
+        )
+
+
+def swarm_frame(snapshot: Snapshot, rows: Rows) -> dict[str, Any]:
     """Robots as columns, in the order of ids; positions in metres, silence in seconds."""
     views = [snapshot.robots[name] for name in sorted(snapshot.robots)]
     reasons = dict(snapshot.groups.ungrouped)
+    told = rows.of(views)
     return {
         "time": reports.time_of(snapshot.wall_ns).isoformat(),
         "revision": snapshot.groups.revision,
@@ -58,10 +98,10 @@ def swarm_frame(snapshot: Snapshot) -> dict[str, Any]:
             "status": [view.status for view in views],
             "group": [view.group for view in views],
             "reason": [reasons.get(view.id) for view in views],
-            "at_m": [None if view.fix is None else rounded(view.fix.pose.centre_m) for view in views],
-            "view": [_view(view) for view in views],
+            "at_m": [row.at_m for row in told],
+            "view": [row.corners for row in told],
             "silent_s": [_silent_s(view, snapshot.wall_ns) for view in views],
-            "off_deg": [None if view.correction is None else round(view.correction.deg, 1) for view in views],
+            "off_deg": [row.off_deg for row in told],
         },
     }
 
@@ -77,10 +117,6 @@ def corners(camera: Camera, pose: Pose) -> list[float]:
     pixels = np.array([[-0.5, -0.5, 1], [width, -0.5, 1], [width, height, 1], [-0.5, height, 1]])
     rays = pixels @ camera.rays_from_pixels.T @ pose.world_from_camera.T
     return np.round(rays[:, :2], _DECIMALS_M).ravel().tolist()
-
-
-def _view(view: RobotView) -> list[float] | None:
-    return None if view.camera is None or view.fix is None else corners(view.camera, view.fix.pose)
 
 
 def _silent_s(view: RobotView, wall_ns: int) -> float | None:

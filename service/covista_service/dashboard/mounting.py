@@ -6,22 +6,16 @@ import asyncio
 import threading
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from importlib.util import find_spec
 
 from fastapi import APIRouter, FastAPI, Request, Response
 from fastapi.responses import RedirectResponse
 
 from covista_service.answers import NotKnownError
-from covista_service.dashboard.places import PREFIX
+from covista_service.dashboard.places import PREFIX, has_pages
 
 _ABSENT = "this station was installed without its pages: pip install 'covista[dashboard]'"
 # NiceGUI has one application a process, in one event loop.
 _turn = threading.Lock()
-
-
-def has_pages() -> bool:
-    """Whether what serves them is installed."""
-    return find_spec("nicegui") is not None
 
 
 def add_pages(app: FastAPI) -> None:
@@ -36,13 +30,15 @@ def add_pages(app: FastAPI) -> None:
 
         app.include_router(routes)
         return
-    from covista_service.dashboard import data, log_in, serving
+    from covista_service.dashboard import data, data_health, data_settings, log_in, serving
 
     @routes.get("")
     async def first(request: Request) -> Response:
         return RedirectResponse(f"{request.scope.get('root_path', '')}{PREFIX}/")
 
     routes.include_router(data.router)
+    routes.include_router(data_health.router)
+    routes.include_router(data_settings.router)
     routes.include_router(log_in.router)
     app.include_router(routes)
     app.mount(PREFIX, serving.application())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
+
 from covista_service.access import Pages
 
 PREFIX = "/dashboard"
@@ -17,3 +19,8 @@ PAGES = Pages(
     log_in=LOG_IN,
     sockets="/_nicegui_ws/",
 )
+
+
+def has_pages() -> bool:
+    """Whether what serves them is installed."""
+    return find_spec("nicegui") is not None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, NotRequired, TypedDict
 
@@ -12,6 +12,7 @@ from fastapi import Depends, Request
 from covista_service.access import Gate
 from covista_service.answers.past import Archive
 from covista_service.dashboard.frames import Frames
+from covista_service.dashboard.rounds import Rounds
 from covista_service.loop import Loop
 from covista_service.loop.vitals import Vitals
 from covista_service.telemetry import Telemetry
@@ -19,7 +20,10 @@ from covista_service.telemetry import Telemetry
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sources:
-    """The station as REST has it too; `name` changes with each start."""
+    """The station as REST has it too; `name` changes with each start.
+
+    `listeners` counts who hears events over REST, `given_up` clients that were turned away there, by reason.
+    """
 
     name: str
     loop: Loop
@@ -29,6 +33,9 @@ class Sources:
     gate: Gate
     archive: Archive
     frames: Frames = field(default_factory=Frames)
+    listeners: Callable[[], int] = lambda: 0
+    given_up: Callable[[], Mapping[str, int]] = dict
+    rounds: Rounds = field(default_factory=Rounds)
 
 
 class State(TypedDict):

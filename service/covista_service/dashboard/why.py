@@ -16,8 +16,6 @@ _HOW = {
     FoundBy.PREDICTED: "predicted from what each of them has seen",
     FoundBy.DECAYED: "from some time ago",
 }
-# An overlap below is none to speak of.
-_LITTLE = 0.05
 
 
 def why(snapshot: Snapshot, a: str, b: str) -> list[str]:
@@ -56,27 +54,36 @@ def _shared(pair: PairView, a: str, b: str) -> Iterator[str]:
 
 
 def _others(snapshot: Snapshot, a: RobotView, b: RobotView) -> Iterator[str]:
-    """What each is alike to its own group and to the other's, by the similarity that groups are made by."""
+    """How alike they are to their groups, by the similarity that groups are made by."""
     similarity = snapshot.similarity
     place = {name: k for k, name in enumerate(similarity.robots)}
-    if a.id not in place or b.id not in place:
-        return
-    if a.group is None or b.group is None:
+    if a.group is None or b.group is None or a.id not in place or b.id not in place:
         return
     if a.group == b.group:
         yield (
-            f"Their similarity is {similarity.similarity[place[a.id], place[b.id]]:.2f}; "
-            "groups are made so that it is high within and low between them."
+            f"Their similarity is {similarity.similarity[place[a.id], place[b.id]]:.2f}; groups are made so that it is "
+            "high within them and low between them."
         )
         return
-    for one, other in ((a, b), (b, a)):
-        own, theirs = (_mean(snapshot, place, one, group) for group in (one.group, other.group))
-        beside = "it is alone in" if own is None else f"its similarity is {own:.2f} on average in"
-        yield f"{one.id} stands where {beside} {one.group}, and {theirs or 0:.2f} to {other.group}."
+    for one, group in ((a, b.group), (b, a.group)):
+        yield _drawn_to(one, group, *(_mean(snapshot, place, one, each) for each in (one.group or "", group)))
+    if snapshot.groups.waiting and {a.id, b.id} & set(snapshot.groups.waiting):
+        yield "Other groups are proposed for them, and shown if that lasts."
 
 
-def _mean(snapshot: Snapshot, place: dict[str, int], robot: RobotView, group: str | None) -> float | None:
-    members = [name for name in snapshot.groups.by_label[group or ""].robots if name != robot.id and name in place]
+def _drawn_to(robot: RobotView, group: str, own: float | None, theirs: float | None) -> str:
+    like_them = f"{theirs or 0:.2f} to {group}"
+    if own is None:
+        return f"{robot.id} is alone in {robot.group}; its similarity is {like_them}."
+    means = f"on average its similarity is {own:.2f} to its own group and {like_them}."
+    if own > (theirs or 0):
+        return f"{robot.id} belongs more to {robot.group}: {means}"
+    return f"{robot.id} stands between them: {means}"
+
+
+def _mean(snapshot: Snapshot, place: dict[str, int], robot: RobotView, group: str) -> float | None:
+    """The similarity of a robot to the others of a group; None where there are none."""
+    members = [name for name in snapshot.groups.by_label[group].robots if name != robot.id and name in place]
     if not members:
         return None
     return float(np.mean([snapshot.similarity.similarity[place[robot.id], place[name]] for name in members]))

@@ -14,6 +14,7 @@ from covista_schemas.errors import CovistaError
 from covista_schemas.reports import Group
 
 from covista_service.config import Settings
+from covista_service.dashboard.places import PAGES, has_pages
 from covista_service.demo import children
 from covista_service.demo.accuracy import Accuracy, rendered_overlap
 from covista_service.demo.children import Child
@@ -66,6 +67,8 @@ def run(options: DemoOptions, screen: Screen) -> DemoReport | None:
             return None
         screen.line(f"API      {ready.url}/api/v1/groups")
         screen.line(f"docs     {ready.url}/docs")
+        if has_pages():
+            screen.line(f"pages    {ready.url}{PAGES.prefix}/")
         screen.line(f"zenoh    {', '.join(ready.link)}")
         watch = stack.enter_context(closing(Watch(ready.url)))
         _warmed(watch, signals, screen)

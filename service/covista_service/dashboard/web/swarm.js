@@ -71,9 +71,10 @@ export default {
             </li>
           </ul>
         </section>
-        <section v-if="missing.length || quiet.length" aria-labelledby="cv-missing">
+        <section v-if="robots.length" aria-labelledby="cv-missing">
           <h2 id="cv-missing">Missing</h2>
-          <ul class="cv-list">
+          <p v-if="!missing.length && !quiet.length">Nobody: all {{ robots.length }} robots are live and in a group.</p>
+          <ul v-else class="cv-list">
             <li v-for="robot in missing" :key="robot.id">
               <button class="cv-robot" :class="'cv-' + robot.status" :aria-pressed="chosen.includes(robot.id)"
                 @click="choose(robot.id)">{{ robot.id }}</button>
@@ -95,6 +96,8 @@ export default {
               <option v-for="name in names" :key="name">{{ name }}</option></select></label>
           </p>
           <p v-for="sentence in why?.sentences" :key="sentence">{{ sentence }}</p>
+          <p class="cv-note">Similarity is 1 for robots that see the same from the same place, and 0 for those that share nothing and
+            stand far apart.</p>
           <p><a :href="page('/pairs/' + pair.a + '/' + pair.b)">What both see</a>,
             <a :href="page('/robots/' + pair.a)">{{ pair.a }}</a>, <a :href="page('/robots/' + pair.b)">{{ pair.b }}</a></p>
         </section>

@@ -3,8 +3,9 @@ import { colourOf, shapeOf, trace } from "covista/looks.js";
 
 const RADIUS = 7;
 const SMALL = 4;
-// Beyond so many robots, less is drawn of each.
+// Beyond so many robots less is drawn of each, and what looks the same is drawn in one go.
 const MANY = 120;
+const CLASSES = 4;
 const VIEW_SHARE = 0.16;
 
 const inks = (dark) =>
@@ -25,7 +26,10 @@ export function draw(context, window, shown, edges, { chosen, hovered, dark }) {
   const reach = (VIEW_SHARE * Math.min(width, height)) / window.pxPerM / Math.max(1, Math.sqrt(placed.length / 12));
   if (!many) placed.forEach((each) => drawTrack(context, window, each, dark));
   drawEdges(context, edges, where, look, chosen, many);
-  placed.forEach((each) => drawView(context, window, each, reach, dark, chosen));
+  if (many) drawDirections(context, window, placed, reach, dark);
+  placed.forEach((each) => {
+    if (!many || chosen.includes(each.robot.id)) drawView(context, window, each, reach, dark, chosen);
+  });
   const radius = many ? SMALL : RADIUS;
   placed.forEach((each) => drawRobot(context, where.get(each.robot.id), each.robot, radius, look, dark, chosen, hovered));
   drawNames(context, placed, where, radius, look, chosen, hovered, many);
@@ -65,21 +69,49 @@ function drawTrack(context, window, { robot, at, track }, dark) {
 }
 
 function drawEdges(context, edges, where, look, chosen, many) {
-  for (const { a, b, ofFirst, ofSecond } of edges) {
-    const from = where.get(a);
-    const to = where.get(b);
+  const classes = Array.from({ length: CLASSES }, () => []);
+  const marked = [];
+  for (const edge of edges) {
+    const from = where.get(edge.a);
+    const to = where.get(edge.b);
     if (!from || !to) continue;
-    const share = Math.max(ofFirst, ofSecond);
-    const marked = chosen.includes(a) || chosen.includes(b);
-    context.strokeStyle = marked ? look.ink : look.edge;
-    context.globalAlpha = marked ? 0.95 : (many ? 0.15 : 0.25) + 0.5 * share;
-    context.lineWidth = (many ? 0.5 : 1) + (many ? 1.5 : 5) * share;
-    context.beginPath();
+    const share = Math.max(edge.ofFirst, edge.ofSecond);
+    const drawn = [from, to, Math.min(CLASSES - 1, Math.floor(CLASSES * share))];
+    if (chosen.includes(edge.a) || chosen.includes(edge.b)) marked.push(drawn);
+    else classes[drawn[2]].push(drawn);
+  }
+  const width = (level) => (many ? 0.6 + 0.5 * level : 1 + 1.4 * level);
+  classes.forEach((lines, level) => {
+    context.globalAlpha = (many ? 0.15 : 0.25) + 0.14 * level;
+    strokeLines(context, lines, look.edge, width(level));
+  });
+  context.globalAlpha = 0.95;
+  for (const line of marked) strokeLines(context, [line], look.ink, width(line[2]));
+  context.globalAlpha = 1;
+}
+
+function strokeLines(context, lines, colour, width) {
+  context.strokeStyle = colour;
+  context.lineWidth = width;
+  context.beginPath();
+  for (const [from, to] of lines) {
     context.moveTo(...from);
     context.lineTo(...to);
-    context.stroke();
   }
-  context.globalAlpha = 1;
+  context.stroke();
+}
+
+// Of many robots no more than where they look.
+function drawDirections(context, window, placed, reach, dark) {
+  const byColour = new Map();
+  for (const { robot, at, view } of placed) {
+    if (!view) continue;
+    const ahead = [0, 1].map((axis) => at[axis] + (reach / 4) * (view[axis] + view[axis + 2] + view[axis + 4] + view[axis + 6]));
+    const colour = colourOf(robot.group, dark);
+    if (!byColour.has(colour)) byColour.set(colour, []);
+    byColour.get(colour).push([window.px(at), window.px(ahead)]);
+  }
+  for (const [colour, lines] of byColour) strokeLines(context, lines, colour, 1.2);
 }
 
 // The field of view from above: the camera and the corners of its image, as far as the map has room for.

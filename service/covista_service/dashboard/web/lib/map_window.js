@@ -1,5 +1,6 @@
 // Which part of the ground a map shows: x to the right and y up in metres, to pixels.
-const MARGIN = 0.12;
+// Views reach beyond those who look.
+const MARGIN = 0.18;
 const LEAST_M = 1;
 
 export class MapWindow {

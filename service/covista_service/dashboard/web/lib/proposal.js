@@ -1,0 +1,60 @@
+// Settings that somebody tries, beside those in force. They stand in the address, so that they can be handed on.
+import { computed, reactive, ref, shallowRef, watch } from "vue";
+import { differing, flat, fromAddress, same, toAddress } from "covista/settings_words.js";
+
+export function useProposal() {
+  const choices = shallowRef([]);
+  const live = shallowRef(null);
+  // In force when somebody last looked at what others change.
+  const seen = shallowRef(null);
+  const wanted = reactive({});
+  // What the address names and is no setting, or no value of one.
+  const unread = ref([]);
+
+  const changes = computed(() => {
+    if (!live.value) return [];
+    return choices.value
+      .filter(({ name }) => name in wanted && !same(wanted[name], live.value[name]))
+      .map((choice) => ({ name: choice.name, choice, value: wanted[choice.name], was: live.value[choice.name] }));
+  });
+  const others = computed(() => (live.value ? differing(seen.value, live.value) : []));
+
+  const valueOf = (name) => (name in wanted ? wanted[name] : live.value[name]);
+  const set = (name, value) => {
+    if (same(value, live.value[name])) delete wanted[name];
+    else wanted[name] = value;
+  };
+  const reset = (name) => {
+    for (const each of name ? [name] : Object.keys(wanted)) delete wanted[each];
+  };
+  const noted = () => (seen.value = live.value);
+
+  // Settings came from the station.
+  const take = (settings) => {
+    const now = flat(settings);
+    if (live.value && !differing(live.value, now).length) return;
+    live.value = now;
+    seen.value ??= now;
+  };
+  // They are those that somebody has just given here: nothing to be told of.
+  const given = (settings, changed) => {
+    seen.value = { ...seen.value, ...Object.fromEntries(changed.map(({ name, value }) => [name, value])) };
+    take(settings);
+  };
+
+  const read = (known) => {
+    choices.value = known;
+    for (const [name, text] of new URLSearchParams(location.search)) {
+      const choice = known.find((each) => each.name === name);
+      const value = choice && fromAddress(choice, text);
+      if (value === undefined) unread.value.push(`${name}=${text}`);
+      else wanted[name] = value;
+    }
+  };
+  watch([changes, choices], ([now]) => {
+    if (!live.value || !choices.value.length) return;
+    const query = now.map(({ name, value }) => `${name}=${encodeURIComponent(toAddress(value))}`).join("&");
+    history.replaceState(history.state, "", location.pathname + (query ? `?${query}` : "") + location.hash);
+  });
+  return { choices, live, changes, others, unread, valueOf, set, reset, noted, take, given, read };
+}

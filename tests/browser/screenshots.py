@@ -1,0 +1,89 @@
+"""Takes a picture of every page on a demo of its own: `python -m tests.browser.screenshots [FOLDER]`."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from covista_service.bench.browsing import browser_path
+from playwright.sync_api import Browser, sync_playwright
+
+PICTURES = Path(__file__).parents[2] / "docs" / "pictures" / "dashboard"
+# Until a demo has something to tell: groups, a history, and robots that have moved.
+_WARM_S = 60
+_START_S = 120.0
+_WIDE, _PHONE = (1280, 800), (390, 844)
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """A page as it is to be seen; `full` shows all of it, however long."""
+
+    name: str
+    path: str
+    size_px: tuple[int, int] = _WIDE
+    dark: bool = False
+    full: bool = True
+
+
+SHOTS = (
+    Shot("swarm", "/", full=False),
+    Shot("swarm_dark", "/", dark=True, full=False),
+    Shot("swarm_phone", "/", _PHONE),
+    Shot("similarity", "/similarity"),
+    Shot("pair", "/pairs/r1/r3"),
+    Shot("robot", "/robots/r1"),
+    Shot("timeline", "/timeline"),
+    Shot("what_if", "/what-if?groups=3&criterion=gain"),
+    Shot("health", "/health"),
+)
+
+
+def main(folder: Path) -> None:
+    """Take them all."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with _demo() as url, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=browser_path(), args=["--no-sandbox"])
+        first = browser.new_page()
+        first.goto(f"{url}/dashboard/")
+        first.wait_for_timeout(1000 * _WARM_S)
+        for shot in SHOTS:
+            _take(browser, url, shot, folder)
+        browser.close()
+
+
+def _take(browser: Browser, url: str, shot: Shot, folder: Path) -> None:
+    width, height = shot.size_px
+    page = browser.new_page(viewport={"width": width, "height": height}, color_scheme="dark" if shot.dark else "light")
+    page.goto(f"{url}/dashboard{shot.path}")
+    # Pictures come and the map settles.
+    page.wait_for_timeout(5000)
+    page.screenshot(path=folder / f"{shot.name}.png", full_page=shot.full)
+    page.close()
+    print(folder / f"{shot.name}.png")  # noqa: T201 - what was asked for
+
+
+@contextmanager
+def _demo() -> Iterator[str]:
+    """A demo on ports of its own; the address of its API."""
+    with tempfile.TemporaryDirectory(prefix="covista-") as temporary:
+        command = [sys.executable, "-m", "covista_service", "demo", "--api", "127.0.0.1:0", "--link", "tcp/127.0.0.1:0"]
+        command += ["--database", f"sqlite:///{temporary}/covista.db"]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as demo:
+            try:
+                assert demo.stdout is not None
+                found = next(filter(None, (re.search(r"pages +(\S+)/dashboard/", line) for line in demo.stdout)))
+                yield found[1]
+            finally:
+                demo.terminate()
+                demo.communicate(timeout=_START_S)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else PICTURES)
