@@ -5,7 +5,6 @@ Tests that change more than they put back, or end the station, take one of their
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 from covista_service.access import Scope
+from covista_service.bench.browsing import BROWSERS, browser_path
 
 from tests.browser.stations import BrowsedStation, browsed_station
 from tests.browser.visitor import Visitor
@@ -21,7 +21,6 @@ from tests.browser.visitor import Visitor
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
-_PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
 # For the first test of a worker, which waits for station and browser too.
 _PATIENCE_S = 400
 
@@ -48,9 +47,9 @@ def chromium() -> str:
     for module in ("playwright", "nicegui"):
         if find_spec(module) is None:
             pytest.skip(f"{module} is not installed")
-    found = next(filter(None, map(shutil.which, _PROGRAMS)), None)
+    found = browser_path()
     if found is None:
-        pytest.skip(f"no browser is installed: none of {', '.join(_PROGRAMS)}")
+        pytest.skip(f"no browser is installed: none of {', '.join(BROWSERS)}")
     return found
 
 

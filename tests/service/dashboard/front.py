@@ -11,7 +11,9 @@ import httpx
 from covista_service.access import Attempts, Gate, Keyring, Scope
 from covista_service.access.sessions import COOKIE
 from covista_service.api import rest
-from covista_service.dashboard import PAGES, Sources, data, log_in
+from covista_service.dashboard import data, log_in
+from covista_service.dashboard.places import PAGES
+from covista_service.dashboard.sources import Sources
 from fastapi import APIRouter, Request, WebSocket
 from fastapi.responses import PlainTextResponse
 

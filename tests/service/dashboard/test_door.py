@@ -3,7 +3,7 @@
 import pytest
 from covista_service.access import Scope
 from covista_service.access.tokens import new_secret
-from covista_service.dashboard import PAGES
+from covista_service.dashboard.places import PAGES
 
 from tests.service.dashboard.front import HOST, OTHERS, OWN, SOCKET, Front, locked, says
 from tests.service.dashboard.test_log_in import session_of

@@ -2,7 +2,8 @@
 
 import pytest
 from covista_schemas.reports import Problem
-from covista_service.dashboard import PAGES, add_pages, mounting
+from covista_service.dashboard import mounting, places
+from covista_service.dashboard.places import PAGES
 
 from tests.service.api.conftest import Desk
 
@@ -11,9 +12,9 @@ from tests.service.api.conftest import Desk
 def test_without_pages_there_is_a_word_about_that_and_about_what_to_install(
     monkeypatch: pytest.MonkeyPatch, path: str
 ) -> None:
-    monkeypatch.setattr(mounting, "find_spec", lambda name: None)
+    monkeypatch.setattr(places, "find_spec", lambda name: None)
     desk = Desk()
-    add_pages(desk.app)
+    mounting.add_pages(desk.app)
     answer = desk.ask(f"{PAGES.prefix}{path}")
     assert answer.status_code == 404
     assert answer.headers["content-type"] == "application/problem+json"
