@@ -146,13 +146,13 @@ def browsed_station(
 ) -> Iterator[BrowsedStation]:
     """A station that is ready, with six rovers in two groups unless told otherwise; both are gone at the end."""
     station = BrowsedStation(folder, tls, settings)
-    station.start()
     try:
+        station.start()
         with Rovers(station.link) as station.rovers:
             if rovers:
                 station.rovers.come(*ROBOTS)
                 station.settle()
             yield station
     finally:
-        station.signal(signal.SIGCONT)
+        # One that hangs, or never came to be ready, goes too.
         station.kill()
