@@ -69,6 +69,7 @@ def create_app(settings: Settings) -> FastAPI:
                 parts.vitals,
                 parts.gate,
                 parts.archive,
+                parts.readers,
                 listeners=lambda: parts.stream.listeners,
                 given_up=lambda: parts.outgoing.given_up + parts.stream.given_up,
             )

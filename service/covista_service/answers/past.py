@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 from covista_schemas.errors import CovistaError
@@ -14,7 +15,10 @@ from covista_schemas.reports import (
     GroupsReport,
     PairHistory,
     RobotTrack,
+    TrackPoint,
 )
+
+from covista_service.station.events import Pair
 
 PAGE = 100
 
@@ -25,6 +29,19 @@ class CursorError(CovistaError, ValueError):
 
 class HistoryUnavailableError(CovistaError):
     """The history cannot be read now; the text says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """The swarm at one moment of the past, as far as it was known then.
+
+    `groups` is the revision in force, None if none was or is kept; `points` where robots were; `overlaps` of pairs
+    a < b that had anything in common, the share of a's image that b saw and of b's that a did.
+    """
+
+    groups: GroupsReport | None
+    points: Mapping[str, TrackPoint]
+    overlaps: Mapping[Pair, tuple[float, float]]
 
 
 class Archive(Protocol):
@@ -41,6 +58,9 @@ class Archive(Protocol):
 
     def groups_at(self, time_ns: int) -> GroupsReport | None:
         """The revision that was in force then; None if none was, or it is not kept any more."""
+
+    def moment(self, time_ns: int, reach_s: float) -> Moment:
+        """The swarm then. What was told more than `reach_s` before says nothing of it, but for the groups."""
 
     def events(
         self,

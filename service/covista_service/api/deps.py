@@ -17,9 +17,9 @@ from covista_service.answers.past import Archive
 from covista_service.answers.texts import Texts
 from covista_service.api.delivery import deliver
 from covista_service.api.outgoing import Outgoing
-from covista_service.api.rooms import Room
 from covista_service.api.stream import Stream
 from covista_service.loop import Loop
+from covista_service.loop.rooms import Room
 from covista_service.loop.vitals import Vitals
 from covista_service.station.census import Census
 from covista_service.station.snapshot import Snapshot

@@ -15,7 +15,7 @@ from starlette.exceptions import HTTPException
 from covista_service.answers import NotKnownError, problem_of
 from covista_service.answers.past import CursorError, HistoryUnavailableError
 from covista_service.api.negotiation import NotAcceptableError
-from covista_service.api.rooms import FullError
+from covista_service.loop.rooms import FullError
 
 # What a status means here.
 _MEANINGS: Mapping[int, str] = {

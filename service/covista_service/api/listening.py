@@ -18,8 +18,8 @@ from starlette.types import Receive, Scope, Send
 from covista_service.answers.past import Archive, HistoryUnavailableError
 from covista_service.api.delivery import CUT
 from covista_service.api.errors import refuse
-from covista_service.api.rooms import Room
 from covista_service.api.stream import EVENT_STREAM, LONG_ENOUGH, CrowdedError, Listener, Stream, encode, missed
+from covista_service.loop.rooms import Room
 
 HEARTBEAT_S = 15.0
 # In the scope of a request: HEAD was asked, and what has no end must not begin.

@@ -124,8 +124,15 @@ def _silent_s(view: RobotView, wall_ns: int) -> float | None:
 
 
 def edges_of(similarity: SimilarityView) -> dict[str, Any]:
-    """Who shares what with whom: indices i < j into `robots`, the share of i's image that j sees, and of j's that i."""
-    overlap = np.nan_to_num(similarity.overlap)
+    """Who shares what with whom now."""
+    return edges_between(similarity.robots, np.nan_to_num(similarity.overlap))
+
+
+def edges_between(robots: Sequence[str], overlap: Floats) -> dict[str, Any]:
+    """Who shares what with whom: indices i < j into `robots`, the share of i's image that j sees, and of j's that i.
+
+    `overlap` (N, N) has in row i the shares of i's image; what is not known is 0.
+    """
     shared = np.triu(np.maximum(overlap, overlap.T), 1)
     drawn = shared >= _LEAST_OVERLAP
     if len(shared) > _FEW:
@@ -135,6 +142,6 @@ def edges_of(similarity: SimilarityView) -> dict[str, Any]:
     first, second = np.nonzero(drawn)
     shares = np.round(np.column_stack([overlap[first, second], overlap[second, first]]), _DECIMALS_SHARE)
     return {
-        "robots": list(similarity.robots),
+        "robots": list(robots),
         "pairs": [[i, j, *share] for i, j, share in zip(first.tolist(), second.tolist(), shares.tolist(), strict=True)],
     }

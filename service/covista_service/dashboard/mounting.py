@@ -30,7 +30,7 @@ def add_pages(app: FastAPI) -> None:
 
         app.include_router(routes)
         return
-    from covista_service.dashboard import data, data_health, data_settings, log_in, serving
+    from covista_service.dashboard import data, data_health, data_past, data_robot, data_settings, log_in, serving
 
     @routes.get("")
     async def first(request: Request) -> Response:
@@ -38,6 +38,8 @@ def add_pages(app: FastAPI) -> None:
 
     routes.include_router(data.router)
     routes.include_router(data_health.router)
+    routes.include_router(data_past.router)
+    routes.include_router(data_robot.router)
     routes.include_router(data_settings.router)
     routes.include_router(log_in.router)
     app.include_router(routes)

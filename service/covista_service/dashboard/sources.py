@@ -14,6 +14,7 @@ from covista_service.answers.past import Archive
 from covista_service.dashboard.frames import Frames
 from covista_service.dashboard.rounds import Rounds
 from covista_service.loop import Loop
+from covista_service.loop.rooms import Room
 from covista_service.loop.vitals import Vitals
 from covista_service.telemetry import Telemetry
 
@@ -22,7 +23,8 @@ from covista_service.telemetry import Telemetry
 class Sources:
     """The station as REST has it too; `name` changes with each start.
 
-    `listeners` counts who hears events over REST, `given_up` clients that were turned away there, by reason.
+    `listeners` counts who hears events over REST, `given_up` clients that were turned away there, by reason;
+    `readers` read the archive in threads.
     """
 
     name: str
@@ -32,6 +34,7 @@ class Sources:
     vitals: Callable[[], Vitals]
     gate: Gate
     archive: Archive
+    readers: Room = field(default_factory=lambda: Room(at_once=2, waiting=20))
     frames: Frames = field(default_factory=Frames)
     listeners: Callable[[], int] = lambda: 0
     given_up: Callable[[], Mapping[str, int]] = dict

@@ -53,6 +53,11 @@ def overlay(keyframe: Keyframe, common: CommonField | None, caption: str) -> byt
     return canvas.png(_drawn(Side(keyframe, common, caption)))
 
 
+def view(keyframe: Keyframe) -> bytes:
+    """PNG of what a keyframe shows: its image, or its thumbnail, or its keypoints."""
+    return canvas.png(_ground(keyframe, _scale(keyframe.camera)))
+
+
 def side_by_side(first: Side, second: Side) -> bytes:
     """PNG of both keyframes of a pair, the same plane in the same colour."""
     pictures = [_drawn(side) for side in (first, second)]

@@ -26,15 +26,17 @@ from covista_schemas.reports import (
 from pydantic import ValidationError
 from sqlalchemy import Connection, Row, func, select
 
-from covista_service.answers.past import PAGE, HistoryUnavailableError
+from covista_service.answers.past import PAGE, HistoryUnavailableError, Moment
 from covista_service.store.database import UNUSABLE, file_is_gone, first_line, open_engine
 from covista_service.store.moments import moment, not_after_us
 from covista_service.store.pages import Page, Span, gaps_within, page_of, page_of_kinds, page_of_robot
 from covista_service.store.tables import POSE, events, group_revisions, pair_overlaps, tracks
+from covista_service.store.whereabouts import Reach, overlaps_at, points_at
 from covista_service.telemetry import about
 
 log = logging.getLogger(__name__)
 _R = TypeVar("_R", bound=Report)
+_T = TypeVar("_T")
 
 
 class Archive:
@@ -60,11 +62,22 @@ class Archive:
 
     def groups_at(self, time_ns: int) -> GroupsReport | None:
         """The revision that was in force then; None if none was, or it is not kept any more."""
-        table = group_revisions.c
-        newest = select(table.report).where(table.time_us <= not_after_us(time_ns))
         with self._reading() as connection:
-            rows = connection.execute(newest.order_by(table.time_us.desc(), table.id.desc()).limit(1)).all()
-        return next(iter(_reports(GroupsReport, rows)), None)
+            return _groups_at(connection, time_ns)
+
+    def moment(self, time_ns: int, reach_s: float) -> Moment:
+        """The swarm then; what was told more than `reach_s` before says nothing of it, but for the groups."""
+        reach = Reach.of(time_ns, round(reach_s * 1e9))
+        with self._reading() as connection:
+            points = _readable(lambda row: (row.robot, _point(row[:-1])), points_at(connection, reach))
+            return Moment(
+                groups=_groups_at(connection, time_ns),
+                points=dict(points),
+                overlaps={
+                    (row.a, row.b): (row.overlap_a or 0.0, row.overlap_b or 0.0)
+                    for row in overlaps_at(connection, reach)
+                },
+            )
 
     def events(
         self,
@@ -144,13 +157,20 @@ class Archive:
             raise HistoryUnavailableError(f"the history cannot be read: {first_line(error)}") from error
 
 
+def _groups_at(connection: Connection, time_ns: int) -> GroupsReport | None:
+    table = group_revisions.c
+    newest = select(table.report).where(table.time_us <= not_after_us(time_ns))
+    rows = connection.execute(newest.order_by(table.time_us.desc(), table.id.desc()).limit(1)).all()
+    return next(iter(_reports(GroupsReport, rows)), None)
+
+
 def _reports(kind: type[_R], rows: Sequence[Row[Any]]) -> list[_R]:
     return _readable(lambda row: kind.read(row.report), rows)
 
 
-def _readable(read: Callable[[Row[Any]], _R], rows: Sequence[Row[Any]]) -> list[_R]:
+def _readable(read: Callable[[Row[Any]], _T], rows: Sequence[Row[Any]]) -> list[_T]:
     """What can be read of the rows: one that cannot must not take the others with it."""
-    said: list[_R] = []
+    said: list[_T] = []
     for row in rows:
         try:
             said.append(read(row))
@@ -165,7 +185,7 @@ def _moment(row: Row[Any]) -> PairMoment:
     return PairMoment(time=moment(time_us), overlap_a=first, overlap_b=second, found_by=found_by)
 
 
-def _point(row: Row[Any]) -> TrackPoint:
+def _point(row: Sequence[Any]) -> TrackPoint:
     time_us, _, x, y, z, *orientation = tuple(row)
     return TrackPoint.model_validate(
         {"time": moment(time_us), "position_m": (x, y, z), "orientation_xyzw": tuple(orientation)}

@@ -30,6 +30,11 @@ export class Motion {
     this.robots = next;
   }
 
+  // What comes next did not come of what is shown: in the past one leaps.
+  forget() {
+    this.robots = new Map();
+  }
+
   // Where everybody is to be drawn: [{ robot, at, view, track }].
   now(nowMs) {
     return [...this.robots.values()].map((each) => ({ ...this._at(each, nowMs), robot: each.robot, track: each.track }));

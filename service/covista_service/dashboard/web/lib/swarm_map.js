@@ -59,11 +59,12 @@ export default {
 
     watch(() => props.frame, (frame) => {
       if (!frame) return;
+      if (frame.past) motion.forget();
       motion.take(frame.robots, performance.now(), !still.matches && !frame.past);
       revision = frame.revision;
       if (canvas.value) canvas.value.dataset.revision = revision;
       wake();
-    });
+    }, { immediate: true });
     watch([() => props.chosen, hovered, dark, followed], wake);
 
     const resize = () => {
@@ -76,6 +77,7 @@ export default {
     };
     const observer = new ResizeObserver(resize);
     onMounted(() => {
+      if (revision !== null) canvas.value.dataset.revision = revision;
       resize();
       observer.observe(canvas.value);
     });

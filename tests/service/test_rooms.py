@@ -2,7 +2,7 @@ import asyncio
 import threading
 
 import pytest
-from covista_service.api.rooms import FullError, Room
+from covista_service.loop.rooms import FullError, Room
 
 
 def test_so_many_work_at_a_time_so_many_wait_and_one_more_hears_so() -> None:
