@@ -96,22 +96,38 @@ class Gate:
             return self.refuse(Refusal.LIMITED if retry_after_s else found, address, retry_after_s)
         if not covers(found.scopes, wanted):
             return self.refuse(Refusal.SCOPE, address, by=found.name)
-        self.keyring.used(found)
+        self.keyring.used(found.name)
         return Admitted(found.name)
 
     def admit_session(self, secret: str, wanted: Scope, address: str) -> Admitted | Refused:
-        """Judge who shows what `log_in` gave. One that has ended is no failure: nobody guesses 256 bits."""
-        if self.keyring.door is Door.OPEN:
+        """Judge who shows what `log_in` gave, or nothing. That is no failure: nobody guesses 256 bits."""
+        door = self.keyring.door
+        if door is Door.OPEN:
             return Admitted()
+        if door is Door.UNKNOWN:
+            return self.refuse(Refusal.UNREAD, address)
         session = self.sessions.find(secret)
-        if session is None or not self.keyring.lets_in(session.name):
-            return self.refuse(Refusal.SESSION, address)
+        if session is None or not self.keyring.is_live(session.digest):
+            # It ends with its token.
+            self.sessions.end(secret)
+            return self.refuse(Refusal.SESSION if secret else Refusal.MISSING, address)
         if not covers(session.scopes, wanted):
             return self.refuse(Refusal.SCOPE, address, by=session.name)
+        self.keyring.used(session.name)
         return Admitted(session.name)
 
+    def holds(self, secret: str) -> bool:
+        """Whether who showed this would still be let in; to look is no use of a session."""
+        if self.keyring.door is Door.OPEN:
+            return True
+        session = self.sessions.peek(secret)
+        return session is not None and self.keyring.is_live(session.digest)
+
     async def log_in(self, secret: str, address: str) -> str | Refused:
-        """A session for who has a token to read with: what the browser is to show from now on."""
+        """A session for who has a token to read with: what the browser is to show from now on.
+
+        Empty where no token is needed.
+        """
         admitted = await self.admit([f"{_SCHEME} {secret}"], Scope.READ, address)
         if isinstance(admitted, Refused):
             return admitted

@@ -57,6 +57,11 @@ class Keyring:
             return self._door is Door.OPEN
         return any(token.name == name and token.revoked_us is None for token in self._known.values())
 
+    def is_live(self, digest: str) -> bool:
+        """Whether the token of this digest lets somebody in."""
+        token = self._known.get(digest)
+        return token is not None and token.revoked_us is None
+
     def take(self, found: Sequence[Token]) -> None:
         """All tokens, as they were read just now."""
         known = dict(self._known)
@@ -73,9 +78,9 @@ class Keyring:
         """The token that this is, perhaps a revoked one."""
         return tokens.find(secret, tuple(self._known.values()))
 
-    def used(self, token: Token) -> None:
-        """Somebody was let in with it."""
-        self._used_us[token.name] = time.time_ns() // 1000
+    def used(self, name: str) -> None:
+        """Somebody was let in with the token of this name."""
+        self._used_us[name] = time.time_ns() // 1000
 
     def uses(self, *, least_us: int = USE_US) -> dict[str, int]:
         """Tokens that were used so much later than was last `noted`, by name, and when."""

@@ -10,7 +10,7 @@ import secrets
 import time
 from collections import OrderedDict
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from hashlib import blake2b
 
 from covista_service.access.scopes import Scopes
@@ -27,9 +27,10 @@ _RANDOM_BYTES = 32
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """Whose token it was, what that allows, and when the session began and was used last."""
+    """Whose token it was and which, what that allows, and when the session began and was used last."""
 
     name: str
+    digest: str = field(repr=False)
     scopes: Scopes
     begun_s: float
     used_s: float
@@ -49,7 +50,7 @@ class Sessions:
     def begin(self, token: Token) -> str:
         """A session of who has this token: what the browser is to show."""
         secret, now_s = secrets.token_urlsafe(_RANDOM_BYTES), self._clock()
-        self._open[_digest(secret)] = Session(token.name, token.scopes, now_s, now_s)
+        self._open[_digest(secret)] = Session(token.name, token.digest, token.scopes, now_s, now_s)
         while len(self._open) > self._most:
             self._open.popitem(last=False)
         return secret
@@ -59,14 +60,22 @@ class Sessions:
         # Found by its digest: how long that takes tells nothing of secrets.
         key, now_s = _digest(secret), self._clock()
         found = self._open.pop(key, None)
-        if found is None or now_s - found.used_s > IDLE_S or now_s - found.begun_s > LONGEST_S:
+        if found is None or self._is_over(found, now_s):
             return None
-        self._open[key] = Session(found.name, found.scopes, found.begun_s, now_s)
-        return self._open[key]
+        self._open[key] = used = replace(found, used_s=now_s)
+        return used
+
+    def peek(self, secret: str) -> Session | None:
+        """The session that this is; to look is no use of it."""
+        found = self._open.get(_digest(secret))
+        return None if found is None or self._is_over(found, self._clock()) else found
 
     def end(self, secret: str) -> None:
         """Log out."""
         self._open.pop(_digest(secret), None)
+
+    def _is_over(self, session: Session, now_s: float) -> bool:
+        return now_s - session.used_s > IDLE_S or now_s - session.begun_s > LONGEST_S
 
 
 def _digest(secret: str) -> bytes:

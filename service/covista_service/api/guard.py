@@ -65,6 +65,8 @@ _WHY: dict[Refusal, tuple[HTTPStatus, str, str]] = {
 }
 # What logging in can mend.
 _LOG_IN = frozenset({Refusal.MISSING, Refusal.SESSION})
+# What a websocket that may not go on is closed with (RFC 6455).
+_NOT_ALLOWED = 1008
 # Until the tokens are read, which is tried every second.
 _UNREAD_RETRY_S = 2
 
@@ -83,14 +85,14 @@ def guarded(pages: Pages | None = None) -> Callable[[ASGIApp], ASGIApp]:
         async def answer(scope: Request, receive: Receive, send: Send) -> None:
             if scope["type"] == "websocket":
                 admitted = pages is not None and await _opens_socket(scope, pages)
-                await (app(scope, receive, send) if admitted else _hang_up(send))
+                await (app(scope, _while_open(scope, receive, send), send) if admitted else _hang_up(send))
                 return
             if scope["type"] != "http":
                 await app(scope, receive, send)
                 return
             path, mine = scope["path"], pages if pages is not None and pages.holds(scope["path"]) else None
             wanted = wanted_scope(scope["method"], path) if mine is None else mine.wanted_scope(path)
-            found = Admitted() if wanted is None else await _judge(scope, wanted)
+            found = _judge_open(scope, mine) if wanted is None else await _judge(scope, wanted, pages=mine is not None)
             if isinstance(found, Refused):
                 sent_on = mine is not None and mine.is_page(path) and found.reason in _LOG_IN
                 refusal = _to_log_in(scope, mine) if mine and sent_on else _refusal(found, path, wanted)
@@ -110,12 +112,33 @@ async def _opens_socket(scope: Request, pages: Pages) -> bool:
     below = scope["path"].startswith(f"{pages.prefix}{pages.sockets}")
     if not below or not _is_own_page(headers) or "origin" not in headers:
         return False
-    return isinstance(await _judge(scope, Scope.READ), Admitted)
+    return isinstance(await _judge(scope, Scope.READ, pages=True), Admitted)
+
+
+def _while_open(scope: Request, receive: Receive, send: Send) -> Receive:
+    """Hears a websocket until who opened it would not be let in any more; pages say something every few seconds."""
+    gate, headers = _gate_of(scope), Headers(scope=scope)
+    session = _session_of(headers)
+    by_token = bool(headers.getlist("authorization"))
+
+    async def receiving() -> Message:
+        message = await receive()
+        if message["type"] == "websocket.receive" and not (by_token or gate.holds(session)):
+            await _hang_up(send)
+            return {"type": "websocket.disconnect", "code": _NOT_ALLOWED}
+        return message
+
+    return receiving
 
 
 def _to_log_in(scope: Request, pages: Pages) -> Response:
     """And from there back to where one wanted to go."""
     root, back = scope.get("root_path", ""), scope["path"].removeprefix(pages.prefix) or "/"
+    asked = scope["query_string"].decode("latin-1")
+    if scope["method"] not in _ASKS:
+        back = "/"
+    elif asked:
+        back = f"{back}?{asked}"
     return RedirectResponse(f"{root}{pages.prefix}{pages.log_in}?next={quote(back)}", HTTPStatus.SEE_OTHER)
 
 
@@ -160,15 +183,23 @@ def _gate_of(scope: Request) -> Gate:
 
 
 async def _hang_up(send: Send) -> None:
-    await send({"type": "websocket.close", "code": 1008})
+    await send({"type": "websocket.close", "code": _NOT_ALLOWED})
 
 
-async def _judge(scope: Request, wanted: Scope) -> Admitted | Refused:
+def _judge_open(scope: Request, pages: Pages | None) -> Admitted | Refused:
+    """What is open is so to everybody, but a form of ours is sent by our own pages: it says who somebody is."""
+    if pages is None or scope["method"] in _ASKS or _is_own_page(Headers(scope=scope)):
+        return Admitted()
+    return _gate_of(scope).refuse(Refusal.ORIGIN, _address_of(scope))
+
+
+async def _judge(scope: Request, wanted: Scope, *, pages: bool) -> Admitted | Refused:
+    """`pages` are for people in a browser, who show a session, or nothing before they have logged in."""
     gate = _gate_of(scope)
     headers = Headers(scope=scope)
-    address = str((scope.get("client") or ("",))[0])
-    credentials, session = headers.getlist("authorization"), cookie_parser(headers.get("cookie", "")).get(COOKIE)
-    if session and not credentials:
+    address = _address_of(scope)
+    credentials, session = headers.getlist("authorization"), _session_of(headers)
+    if not credentials and (session or pages):
         found = gate.admit_session(session, wanted, address)
         if isinstance(found, Admitted) and not _is_own_page(headers, asks=scope.get("method") in _ASKS):
             return gate.refuse(Refusal.ORIGIN, address, by=found.by)
@@ -179,16 +210,26 @@ async def _judge(scope: Request, wanted: Scope) -> Admitted | Refused:
     return found
 
 
+def _address_of(scope: Request) -> str:
+    return str((scope.get("client") or ("",))[0])
+
+
+def _session_of(headers: Headers) -> str:
+    return cookie_parser(headers.get("cookie", "")).get(COOKIE, "")
+
+
 def _is_own_page(headers: Headers, *, asks: bool = False) -> bool:
     """Whether a browser asks because of a page of this station; one may come from anywhere to what it only `asks` for.
 
-    Browsers say so in Sec-Fetch-Site (Fetch Metadata), those of before 2023 in Origin alone.
+    Browsers say so in Sec-Fetch-Site (Fetch Metadata); those of before 2023, and all where the station is neither at
+    localhost nor behind TLS, in Origin alone.
     """
-    site = headers.get("sec-fetch-site", "same-origin")
     if asks and headers.get("sec-fetch-mode") == "navigate":
         return True
-    origin = headers.get("origin")
-    return site in ("same-origin", "none") and (origin is None or urlsplit(origin).netloc == headers.get("host"))
+    site, origin = headers.get("sec-fetch-site"), headers.get("origin")
+    if site is not None:
+        return site in ("same-origin", "none")
+    return origin is None or urlsplit(origin).netloc == headers.get("host")
 
 
 def _may_be_called(gate: Gate, host: str) -> bool:

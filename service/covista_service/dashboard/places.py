@@ -8,6 +8,8 @@ from covista_service.access import Pages
 
 PREFIX = "/dashboard"
 LOG_IN = "/log-in"
+# With none at all a browser would not say either from where a form is sent.
+REFERRER = "same-origin"
 FILES = ("/_nicegui/", "/files/")
 PAGES = Pages(
     prefix=PREFIX,

@@ -14,11 +14,13 @@ from nicegui import app as pages_app
 from nicegui import core, ui
 from nicegui.client import Client
 from starlette.datastructures import MutableHeaders
-from starlette.responses import PlainTextResponse
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from covista_service.dashboard import pages
-from covista_service.dashboard.places import FILES, PREFIX
+from covista_service.dashboard.places import FILES, PAGES, PREFIX, REFERRER
+from covista_service.dashboard.sockets import bounded_sockets
 
 WEB = Path(__file__).parent / "web"
 # Pages that are open at a time: each holds some memory.
@@ -33,7 +35,11 @@ _POLICY = (
 )
 
 _FILES = tuple(f"{PREFIX}{each}" for each in FILES)
-_FULL = PlainTextResponse("Too many pages are open; close some, or try again in a minute", 503, {"retry-after": "60"})
+_FULL_WORDS = "Too many pages are open; close some, or try again in a minute"
+# Events of sockets that no page of ours has: all that they do, they do in the browser.
+_UNUSED = ("event", "javascript_response", "log")
+_NONE = PlainTextResponse("There is no such page", 404)
+_FULL = PlainTextResponse(_FULL_WORDS, 503, {"retry-after": "60"})
 
 
 @cache
@@ -45,6 +51,7 @@ def _host() -> FastAPI:
     ui.run_with(
         host,
         title="Covista",
+        favicon=(WEB / "icon.svg").read_text(),
         mount_path=PREFIX,
         dark=None,
         language="en-US",
@@ -56,6 +63,10 @@ def _host() -> FastAPI:
         show_welcome_message=False,
     )
     core.app.config.socket_io_js_transports = ["websocket"]
+    for each in _UNUSED:
+        core.sio.handlers["/"].pop(each)
+    # The framework makes a page for it, and keeps that for a minute.
+    pages_app.exception_handlers[404] = _nothing_there
     # Its log says what our own has, and addresses with it.
     logging.getLogger("nicegui").setLevel(logging.ERROR)
     return host
@@ -64,7 +75,11 @@ def _host() -> FastAPI:
 def application() -> ASGIApp:
     """The pages, for what comes below their prefix."""
     _host()
-    return _with_policy(pages_app)
+    return _with_policy(bounded_sockets(pages_app))
+
+
+async def _nothing_there(_request: Request, _error: Exception) -> Response:
+    return _NONE
 
 
 @asynccontextmanager
@@ -85,15 +100,21 @@ def _with_policy(app: ASGIApp) -> ASGIApp:
 
         async def sending(message: Message) -> None:
             if message["type"] == "http.response.start":
-                MutableHeaders(scope=message).setdefault("content-security-policy", _POLICY)
+                headers = MutableHeaders(scope=message)
+                headers.setdefault("content-security-policy", _POLICY)
+                headers.setdefault("referrer-policy", REFERRER)
             await send(message)
 
-        served = _FULL if _is_full(scope["path"]) else app
-        await served(scope, receive, sending)
+        await _served(scope, app)(scope, receive, sending)
 
     return answer
 
 
-def _is_full(path: str) -> bool:
-    """Whether a page is asked for and too many are open."""
-    return len(Client.instances) >= MOST_PAGES and not path.startswith(_FILES)
+def _served(scope: Scope, app: ASGIApp) -> ASGIApp:
+    """What answers: for who asks, without a websocket, where those are, nothing does, for it would be kept."""
+    path = scope["path"]
+    if path.startswith(f"{PREFIX}{PAGES.sockets}"):
+        return _NONE
+    # Whoever asks could write it, and pages would have it in all their addresses.
+    scope["headers"] = [(name, value) for name, value in scope["headers"] if name != b"x-forwarded-prefix"]
+    return _FULL if len(Client.instances) >= MOST_PAGES and not path.startswith(_FILES) else app

@@ -1,6 +1,6 @@
 // At the top of every page: whether the station answers, light or dark, and the way out.
-import { computed, onMounted, ref } from "vue";
-import { asked, data, heardOf, page, standing } from "covista/ask.js";
+import { computed, onMounted, ref, watch } from "vue";
+import { asked, data, heardOf, noteRestart, page, standing } from "covista/ask.js";
 import { pulse } from "covista/pulse.js";
 
 const DARK = "covista-dark";
@@ -24,6 +24,8 @@ export default {
       Quasar.Dark.set(dark);
       localStorage.setItem(DARK, dark);
     };
+    // Nothing is let in any more that this page would try again and again.
+    watch(() => standing.loggedOut, () => globalThis.socket?.disconnect());
     const words = computed(() => {
       if (standing.loggedOut) return "You are not logged in any more.";
       if (standing.lostSince !== null) {
@@ -33,13 +35,13 @@ export default {
       if (standing.restartedAt) return `The station has restarted; connected again at ${standing.restartedAt.toLocaleTimeString()}.`;
       return "";
     });
-    return { session, standing, words, turn, logIn: page("/log-in"), logOut: page("/session/end") };
+    return { session, standing, noteRestart, words, turn, logIn: page("/log-in"), logOut: page("/session/end") };
   },
   template: `
     <div class="cv-standing">
       <p v-if="words" class="cv-alarm" role="status">{{ words }}
         <a v-if="standing.loggedOut" :href="logIn">Log in</a>
-        <button v-else-if="standing.restartedAt && standing.lostSince === null" @click="standing.restartedAt = null">Good</button>
+        <button v-else-if="standing.restartedAt && standing.lostSince === null" @click="noteRestart(null)">Good</button>
       </p>
       <button class="cv-quiet" @click="turn">Light or dark</button>
       <form v-if="session?.name" method="post" :action="logOut">

@@ -7,10 +7,12 @@ export const rest = (path) => `${root}/api/v1${path}`;
 export const data = (path) => `${root}/dashboard/data${path}`;
 export const page = (path) => `${root}/dashboard${path}`;
 
-// How asking goes: shown at the top of every page.
-export const standing = reactive({ lostSince: null, station: null, restartedAt: null, loggedOut: false });
-
 const SEEN = "covista-station";
+const RESTARTED = "covista-restarted";
+
+// How asking goes: shown at the top of every page.
+export const standing = reactive({ lostSince: null, station: null, restartedAt: noted(), loggedOut: false });
+
 const TIMEOUT_MS = 10000;
 
 // What the station answers where it refuses: a problem (RFC 9457).
@@ -65,10 +67,22 @@ export function tagged(url, changed, options = {}) {
   };
 }
 
+// A restart is told of until it is heard of (null): pages are loaded anew after one.
+export function noteRestart(at) {
+  standing.restartedAt = at;
+  if (at) sessionStorage.setItem(RESTARTED, at.getTime());
+  else sessionStorage.removeItem(RESTARTED);
+}
+
+function noted() {
+  const kept = sessionStorage.getItem(RESTARTED);
+  return kept ? new Date(Number(kept)) : null;
+}
+
 // Notes which start of the station answers: after another one all that was shown may be old.
 export function heardOf(station) {
   const before = sessionStorage.getItem(SEEN);
-  if (before && before !== station) standing.restartedAt = new Date();
+  if (before && before !== station) noteRestart(new Date());
   sessionStorage.setItem(SEEN, station);
   standing.station = station;
 }
