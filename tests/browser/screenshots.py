@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from covista_service.bench.browsing import browser_path
+from covista_service.bench.rig import free_endpoint
 from playwright.sync_api import Browser, sync_playwright
 
 PICTURES = Path(__file__).parents[2] / "docs" / "pictures" / "dashboard"
@@ -73,7 +74,7 @@ def _take(browser: Browser, url: str, shot: Shot, folder: Path) -> None:
 def _demo() -> Iterator[str]:
     """A demo on ports of its own; the address of its API."""
     with tempfile.TemporaryDirectory(prefix="covista-") as temporary:
-        command = [sys.executable, "-m", "covista_service", "demo", "--api", "127.0.0.1:0", "--link", "tcp/127.0.0.1:0"]
+        command = [sys.executable, "-m", "covista_service", "demo", "--api", "127.0.0.1:0", "--link", free_endpoint()]
         command += ["--database", f"sqlite:///{temporary}/covista.db"]
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as demo:
             try:
