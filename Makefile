@@ -58,7 +58,7 @@ bench: .venv/.dev ## The benchmarks, beside their peers
 	@exec $(BIN)/covista-station bench
 
 screenshots: .venv/.dev ## A picture of every page of the dashboard, into docs/pictures/dashboard
-	@echo "screenshots: a demo, and a picture of each of its pages, two minutes"
+	@echo "screenshots: a demo, and a picture of each of its pages, four minutes"
 	@$(BIN)/python -m tests.browser.screenshots
 
 up: ## Station and rovers as containers, in the background

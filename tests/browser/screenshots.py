@@ -11,13 +11,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from covista_clients import MissionControl
+from covista_schemas.reports import FoundBy
 from covista_service.bench.browsing import browser_path
 from covista_service.bench.rig import free_endpoint
 from playwright.sync_api import Browser, sync_playwright
 
 PICTURES = Path(__file__).parents[2] / "docs" / "pictures" / "dashboard"
 # Until a demo has something to tell: groups, a history, and robots that have moved.
-_WARM_S = 60
+_WARM_S = 200
 _START_S = 120.0
 _WIDE, _PHONE = (1280, 800), (390, 844)
 
@@ -38,7 +40,6 @@ SHOTS = (
     Shot("swarm_dark", "/", dark=True, full=False),
     Shot("swarm_phone", "/", _PHONE),
     Shot("similarity", "/similarity"),
-    Shot("pair", "/pairs/r1/r3"),
     Shot("robot", "/robots/r1"),
     Shot("timeline", "/timeline"),
     Shot("what_if", "/what-if?groups=3&criterion=gain"),
@@ -54,9 +55,17 @@ def main(folder: Path) -> None:
         first = browser.new_page()
         first.goto(f"{url}/dashboard/")
         first.wait_for_timeout(1000 * _WARM_S)
-        for shot in SHOTS:
+        for shot in (*SHOTS, Shot("pair", _best_pair(url))):
             _take(browser, url, shot, folder)
         browser.close()
+
+
+def _best_pair(url: str) -> str:
+    """The page of the two robots whose images have most in common."""
+    with MissionControl(url) as control:
+        pairs = [pair for pair in control.pairs().pairs if pair.found_by is FoundBy.IMAGE]
+    best = max(pairs, key=lambda pair: min(pair.overlap_a or 0.0, pair.overlap_b or 0.0))
+    return f"/pairs/{best.a}/{best.b}"
 
 
 def _take(browser: Browser, url: str, shot: Shot, folder: Path) -> None:

@@ -42,7 +42,8 @@ def _shell(heading: str, here: str = "") -> Iterator[None]:
                 if address == here:
                     link.props('aria-current="page"')
         views.Standing()
-    with ui.element("main").classes("cv-main").props('id="cv-main" tabindex="-1"'):
+    # What the framework puts around it is the page's main already.
+    with ui.element("div").classes("cv-main").props('id="cv-main" tabindex="-1"'):
         ui.html(f"<h1>{heading}</h1>", sanitize=True)
         yield
 

@@ -1,8 +1,8 @@
-// How groups and robots look, the same on all pages. A label keeps its colour for good: by its number, and where
-// colours come again by the shape. The colours are Okabe and Ito's (2008), told apart by eyes that see fewer; those for
-// the dark are as far apart and lighter.
-const LIGHT = ["#0072b2", "#d55e00", "#009e73", "#b0508f", "#8a6d00", "#1f8fc9", "#8c3b00", "#5b5b5b"];
-const DARK = ["#56b4e9", "#ff8c42", "#2fd0a0", "#e59cc9", "#f0e442", "#9ad4ff", "#d9b38c", "#c4c4c4"];
+// How groups and robots look, the same on all pages. A label keeps its colour and its shape for good, by its number: seven
+// colours and six shapes, so that the next one differs in both and the first pair comes again after 42. The colours are
+// after Okabe and Ito (2008), told apart by eyes that see fewer, without greys; those for the dark are lighter.
+const LIGHT = ["#0072b2", "#d55e00", "#009e73", "#b0508f", "#8a6d00", "#5a3fb8", "#1f1f1f"];
+const DARK = ["#56b4e9", "#ff8c42", "#2fd0a0", "#e59cc9", "#f0e442", "#b3a1ff", "#f5f5f5"];
 export const SHAPES = ["circle", "square", "triangle", "diamond", "pentagon", "cross"];
 const NONE = { light: "#767676", dark: "#9a9a9a" };
 
@@ -16,8 +16,7 @@ export function colourOf(label, dark = isDark()) {
   return palette[(numberOf(label) + palette.length - 1) % palette.length];
 }
 
-export const shapeOf = (label) =>
-  label ? SHAPES[Math.floor((numberOf(label) - 1) / LIGHT.length) % SHAPES.length] : "circle";
+export const shapeOf = (label) => (label ? SHAPES[(numberOf(label) + SHAPES.length - 1) % SHAPES.length] : "circle");
 
 // The outline of a shape around a place, as a path of a canvas.
 export function trace(context, shape, x, y, r) {
