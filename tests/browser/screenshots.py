@@ -86,7 +86,7 @@ def _take(browser: Browser, url: str, shot: Shot, folder: Path) -> None:
 def _keep(picture: Image.Image, file: Path) -> None:
     """As a file of few colours, a third as large; of some a small one too."""
     picture.convert("RGB").quantize(_COLOURS).save(file, optimize=True)
-    print(file)
+    print(file)  # noqa: T201 - what was asked for
     if file.stem in _SMALL:
         small = picture.convert("RGB").resize((_SMALL_PX, round(_SMALL_PX * picture.height / picture.width)))
         small.quantize(_COLOURS).save(file.with_stem(f"{file.stem}_small"), optimize=True)
