@@ -6,6 +6,7 @@ comes while one looks. So the last moment at which both images told planes is ke
 
 from __future__ import annotations
 
+import threading
 from base64 import b64encode
 from collections import OrderedDict
 from dataclasses import dataclass
@@ -46,6 +47,7 @@ class Looks:
     def __init__(self) -> None:
         self._told: OrderedDict[Pair, Look] = OrderedDict()
         self._drawn: OrderedDict[tuple[str, str], dict[str, Any]] = OrderedDict()
+        self._lock = threading.Lock()
 
     def note(self, snapshot: Snapshot, a: str, b: str) -> Look:
         """The pair as it is now; kept if its images tell planes. Raises NotKnownError."""
@@ -54,24 +56,33 @@ class Looks:
             pair = look.view.a, look.view.b
             self._told[pair] = look
             self._told.move_to_end(pair)
-            while len(self._told) > _PAIRS:
-                self._told.popitem(last=False)
+        while self._told and (len(self._told) > _PAIRS or self._is_old(next(iter(self._told.values())), snapshot)):
+            # Pictures are large.
+            self._told.popitem(last=False)
         return look
 
     def best(self, snapshot: Snapshot, a: str, b: str) -> Look:
         """The pair as it was when its images last told planes, or now if that is long ago. Raises NotKnownError."""
         now = self.note(snapshot, a, b)
         told = self._told.get((now.view.a, now.view.b), now)
-        return told if snapshot.now_ns - told.at_ns <= _KEPT_NS and told.view.explained else now
+        return told if told.view.explained and not self._is_old(told, snapshot) else now
+
+    @staticmethod
+    def _is_old(look: Look, snapshot: Snapshot) -> bool:
+        return snapshot.now_ns - look.at_ns > _KEPT_NS
 
     def drawn(self, look: Look, a: str) -> dict[str, Any]:
         """The look with robot `a` as the first: the report, and both pictures or why there are none."""
         key = (look.version, a)
-        if key not in self._drawn:
-            self._drawn[key] = _drawn(look, a)
-            while len(self._drawn) > _DRAWN:
-                self._drawn.popitem(last=False)
-        return self._drawn[key]
+        found = self._drawn.get(key)
+        if found is None:
+            found = _drawn(look, a)
+            # What was drawn in other threads meanwhile may have gone again.
+            with self._lock:
+                self._drawn[key] = found
+                while len(self._drawn) > _DRAWN:
+                    self._drawn.popitem(last=False)
+        return found
 
 
 def _drawn(look: Look, a: str) -> dict[str, Any]:
