@@ -45,6 +45,14 @@ def test_an_overlay_shows_a_picture(stack: Stack) -> None:
     assert picture.std() > 10
 
 
+def test_the_pages_are_there_and_show_every_rover(stack: Stack) -> None:
+    page = httpx.get(f"{stack.url()}/", follow_redirects=True, timeout=10).raise_for_status()
+    assert page.url.path == "/dashboard/"
+    assert "Swarm - Covista" in page.text
+    told = httpx.get(f"{stack.url()}/dashboard/data/swarm", timeout=10).raise_for_status().json()
+    assert set(told["robots"]["id"]) == EVERY_ROBOT
+
+
 def test_nobody_runs_as_root(stack: Stack) -> None:
     assert stack.run("exec", "-T", "station", "id", "-un").strip() == "covista"
     assert stack.run("exec", "-T", "r1", "id", "-un").strip() == "covista"
