@@ -13,7 +13,6 @@ from io import BytesIO
 from pathlib import Path
 
 from covista_clients import MissionControl
-from covista_schemas.reports import FoundBy
 from covista_service.bench.browsing import browser_path
 from covista_service.bench.rig import free_endpoint
 from PIL import Image
@@ -68,8 +67,9 @@ def main(folder: Path) -> None:
 def _best_pair(url: str) -> str:
     """The page of the two robots whose images have most in common."""
     with MissionControl(url) as control:
-        pairs = [pair for pair in control.pairs().pairs if pair.found_by is FoundBy.IMAGE]
-    best = max(pairs, key=lambda pair: min(pair.overlap_a or 0.0, pair.overlap_b or 0.0))
+        pairs = control.pairs().pairs
+    # Those of which images told last; where everybody moves, what was found is soon foretold.
+    best = max(pairs, key=lambda pair: (pair.outcome == "measured", min(pair.overlap_a or 0.0, pair.overlap_b or 0.0)))
     return f"/pairs/{best.a}/{best.b}"
 
 

@@ -100,8 +100,8 @@ class Connection(H11Protocol):
 
     @property
     def _others(self) -> int:
-        """Connections that do not listen to events."""
-        return len(self.connections) - self._listening()
+        """Connections that neither listen to events nor are websockets: pages have a bound of their own."""
+        return sum(isinstance(each, Connection) for each in self.connections) - self._listening()
 
     @property
     def _under_way(self) -> bool:

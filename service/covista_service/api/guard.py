@@ -143,8 +143,9 @@ def _to_log_in(scope: Request, pages: Pages) -> Response:
 
 
 def _while_let_in(scope: Request, by: str | None, send: Send) -> Send:
-    """Sends until the token is revoked, or the first one made: a stream of events would outlive that by days."""
-    keyring = _gate_of(scope).keyring
+    """Sends until the token is revoked, the session ends, or the first token is made: a stream would outlive that."""
+    gate, headers = _gate_of(scope), Headers(scope=scope)
+    session = _session_of(headers) if "authorization" not in headers else ""
     over = is_stream = False
 
     async def sending(message: Message) -> None:
@@ -153,9 +154,10 @@ def _while_let_in(scope: Request, by: str | None, send: Send) -> Send:
             return
         if message["type"] == "http.response.start":
             is_stream = Headers(raw=message["headers"]).get("content-type", "").startswith(EVENT_STREAM)
-        elif not keyring.lets_in(by):
+        elif not (gate.holds(session) if session else gate.keyring.lets_in(by)):
             over = True
-            await _cut(scope, send, Refusal.MISSING if by is None else Refusal.REVOKED, is_stream)
+            ended = Refusal.SESSION if session else Refusal.REVOKED
+            await _cut(scope, send, Refusal.MISSING if by is None else ended, is_stream)
             return
         await send(message)
 

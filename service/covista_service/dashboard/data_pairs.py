@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from typing import Annotated
 
 from covista_schemas.keys import ID_PATTERN
@@ -46,5 +45,5 @@ async def look(
     told = {"version": found.version, "since_s": round((snapshot.now_ns - found.at_ns) / NS_PER_S, 1)}
     if found.version != known:
         # Drawing takes some ten milliseconds, and clustering planes as many.
-        told |= await asyncio.to_thread(sources.looks.drawn, found, a)
+        told |= await sources.drawing.run(lambda: sources.looks.drawn(found, a))
     return Response(to_json(told), media_type=_JSON)

@@ -26,7 +26,8 @@ router = APIRouter(prefix="/data", include_in_schema=False)
 @router.get("/past")
 async def past(sources: SourcesNow, moment: Annotated[AwareDatetime, Query(alias="time")]) -> Response:
     """The swarm at a moment of the past, in the form of `/swarm`. Raises HistoryUnavailableError or FullError."""
-    time_ns = (moment - _EPOCH) // timedelta(microseconds=1) * 1000
+    # What is still to come is as it is now.
+    time_ns = min((moment - _EPOCH) // timedelta(microseconds=1) * 1000, time.time_ns())
     snapshot = sources.loop.snapshot()
     archive = sources.archive
 

@@ -72,7 +72,8 @@ async def log_in(request: Request, sources: SourcesNow) -> Response:
     sources.gate.sessions.end(request.cookies.get(COOKIE, ""))
     response = _sent_on(request, back)
     if found:
-        secure = request.url.scheme == "https"
+        # A proxy may speak TLS for the station: the browser says where it thinks it is.
+        secure = request.url.scheme == "https" or request.headers.get("origin", "").startswith("https://")
         response.set_cookie(COOKIE, found, httponly=True, samesite="lax", secure=secure, path=_root(request) or "/")
     return response
 

@@ -64,7 +64,7 @@ def _host() -> FastAPI:
     )
     core.app.config.socket_io_js_transports = ["websocket"]
     for each in _UNUSED:
-        core.sio.handlers["/"].pop(each)
+        core.sio.handlers["/"].pop(each, None)
     # The framework makes a page for it, and keeps that for a minute.
     pages_app.exception_handlers[404] = _nothing_there
     # Its log says what our own has, and addresses with it.

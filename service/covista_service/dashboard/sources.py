@@ -41,6 +41,8 @@ class Sources:
     given_up: Callable[[], Mapping[str, int]] = dict
     rounds: Rounds = field(default_factory=Rounds)
     looks: Looks = field(default_factory=Looks)
+    # One picture is drawn at a time: who waits for the same finds it there.
+    drawing: Room = field(default_factory=lambda: Room(at_once=1, waiting=50))
 
 
 class State(TypedDict):

@@ -38,7 +38,8 @@ def log_to_stderr(level: str, form: LogFormat = "text", lines_per_minute: int = 
         logging.getLogger(package).setLevel(least)
     # Neither each step of a migration nor each request of a dashboard is news.
     logging.getLogger("alembic").setLevel(logging.WARNING)
-    logging.getLogger("uvicorn.access").setLevel(logging.WARNING)
+    for each in ("access", "error"):
+        logging.getLogger(f"uvicorn.{each}").setLevel(logging.WARNING)
 
 
 def handler_for(stream: TextIO, form: LogFormat, lines_per_minute: int) -> logging.Handler:

@@ -7,6 +7,7 @@ import pytest
 from covista_service.dashboard.data_pairs import router
 from covista_service.dashboard.looks import Looks
 from covista_service.dashboard.sources import sources_of
+from covista_service.loop.rooms import Room
 from fastapi import FastAPI
 
 from tests.service.answers.test_answers import FIRST, SECOND, both_see_the_wall
@@ -20,7 +21,7 @@ def app() -> FastAPI:
     scene.send("r2", SECOND)
     scene.settle(both_see_the_wall)
     snapshot = scene.snapshot
-    sources = SimpleNamespace(loop=SimpleNamespace(snapshot=lambda: snapshot), looks=Looks())
+    sources = SimpleNamespace(loop=SimpleNamespace(snapshot=lambda: snapshot), looks=Looks(), drawing=Room(1, 9))
     app = FastAPI()
     app.include_router(router)
     app.dependency_overrides[sources_of] = lambda: sources
