@@ -113,11 +113,12 @@ def test_what_stood_for_long_is_drawn_where_it_had_come_just_after_another(
     busy = [groups(k, k / 10, {"g1": ["r1", "r2"]}) for k in range(1, 100)]
     # Both in one part of the thinned time, and then nothing for very long.
     pages_desk.write(*busy, groups(100, 501, {"g1": ["r1", "r2"]}), groups(101, 501.1, {"g2": ["r1"], "g1": ["r2"]}))
+    pages_desk.write(groups(102, 990, {"g1": ["r1", "r2"]}))
     told = bands(pages_desk.archive, ns(0), ns(1000))
     assert told["thinned"]
     assert standing_at(told["runs"], "r1", ms(501.1)) == "g2"
-    assert standing_at(told["runs"], "r1", ms(1000)) == "g2"
-    assert told["runs"]["r1"][-1] == (ms(501.1), "g2")
+    assert standing_at(told["runs"], "r1", ms(980)) == "g2"
+    assert told["runs"]["r1"][-2:] == [(ms(501.1), "g2"), (ms(990), "g1")]
 
 
 def test_no_more_is_read_where_the_time_begins_before_the_history(
