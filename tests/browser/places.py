@@ -18,6 +18,6 @@ CONTENT = {
     "Timeline": (".cv-timeline canvas", ".cv-then-groups li"),
     "What if": ("section[aria-labelledby=cv-beside] li", "section[aria-labelledby=cv-scores] details"),
     "Health": ("section[aria-labelledby=cv-parts] tbody tr", "section[aria-labelledby=cv-facts] dd"),
-    "Pair": (".cv-picture img", "section[aria-labelledby=cv-facts] dd", ".cv-line-chart svg"),
+    "Pair": (".cv-picture img", "section[aria-labelledby=cv-facts] dd"),
     "Robot": ("#cv-robot-id", ".cv-view", "section[aria-labelledby=cv-neighbours] td"),
 }
