@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from tests.browser.places import CONTENT
+
 if TYPE_CHECKING:
     from playwright.sync_api import Locator, Page
 
 
 def opened(page: Page, address: str, heading: str) -> Page:
-    """Go to a page and wait until its view and the head of all pages stand."""
+    """Go to a page and wait until its view and the head of all pages stand, and show what the station has told."""
     page.goto(address)
     stands(page, heading)
+    for selector in CONTENT[heading]:
+        page.locator(selector).first.wait_for()
     return page
 
 

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from playwright.sync_api import Page
 
 SIZES = {"wide": WIDE, "phone": PHONE}
+# What is folded up is held to the same.
+OPEN_ALL = "document.querySelectorAll('details').forEach((each) => (each.open = true))"
 OVERFLOW = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
 
 
@@ -42,10 +44,21 @@ def test_axe_finds_nothing_serious_and_no_page_is_too_wide(visitor: Visitor, siz
         opened(page, address, heading)
         if heading == "Swarm":
             await_groups(page, 2)
+        page.evaluate(OPEN_ALL)
         found[heading] = serious(page)
         if page.evaluate(OVERFLOW) > 0:
             found[heading].append("wider than the window")
     assert not any(found.values()), found
+
+
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+def test_the_question_before_settings_are_applied_is_held_to_the_same(visitor: Visitor, dark: bool) -> None:
+    page = visitor.page(dark=dark, size=PHONE)
+    opened(page, "/dashboard/what-if?groups=3", "What if")
+    page.get_by_role("button", name="Apply ...").click()
+    page.get_by_role("dialog").wait_for()
+    assert serious(page) == []
+    assert page.evaluate(OVERFLOW) <= 0
 
 
 @pytest.mark.parametrize("size", SIZES)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import statistics
 import threading
 import time
 from collections.abc import Iterator
@@ -22,8 +21,10 @@ if TYPE_CHECKING:
     from playwright.sync_api import Page
 
 CHANGES, SOON_S = 10, 1.0
-# A machine that does much else too.
-LAW_S = 3.0
+# One of them, on a machine that does much else too.
+LATEST_S = 2.0
+# Longer than anything on the page waits between two questions.
+LONG_MS = 3000
 # Notes when the map first shows a revision, by the clock that Python has too.
 WATCH = """() => {
     const map = document.querySelector("canvas[data-revision]");
@@ -70,8 +71,8 @@ def test_a_group_change_is_seen_soon_after_it_was_published(page: Page, station:
             assert sorted(groups_shown(page)) == sorted(group.robots for group in control.groups().groups)
     in_order = sorted(late.values())
     assert len(in_order) == CHANGES
-    assert statistics.median(in_order) <= SOON_S, in_order
-    assert in_order[-1] <= LAW_S, in_order
+    assert in_order[-2] <= SOON_S, in_order
+    assert in_order[-1] <= LATEST_S, in_order
 
 
 def test_a_rover_that_leaves_and_comes_is_seen_on_the_page(page: Page, station: BrowsedStation) -> None:
@@ -90,19 +91,29 @@ def test_a_rover_that_leaves_and_comes_is_seen_on_the_page(page: Page, station: 
 
 def test_a_hidden_page_asks_for_nothing_until_it_is_looked_at_again(page: Page) -> None:
     asked: list[str] = []
+    answered: list[str] = []
     page.on("request", lambda request: asked.append(request.url))
+    for end in ("requestfinished", "requestfailed"):
+        page.on(end, lambda request: answered.append(request.url))  # type: ignore[call-overload]
+    page.clock.install()
     opened(page, "/dashboard/", "Swarm")
     await_groups(page, 2)
+    before = len(asked)
+    page.clock.run_for(LONG_MS)
+    page.wait_for_function("() => true")
+    assert len(asked) > before
     page.evaluate("""() => {
         globalThis.hiddenNow = true;
         Object.defineProperty(document, "hidden", { get: () => globalThis.hiddenNow });
         document.dispatchEvent(new Event("visibilitychange"));
     }""")
-    # What was on its way, and then as long as anything on the page waits between two questions.
-    page.wait_for_timeout(1000)
+    # What was on its way.
+    wait_until(lambda: page.evaluate("1") and len(answered) == len(asked), "all is answered")
     asked.clear()
-    page.wait_for_timeout(3000)
-    assert asked == []
+    page.clock.run_for(LONG_MS)
+    page.evaluate("fetch('/dashboard/data/session').then((answer) => answer.status)")
+    assert [url for url in asked if not url.endswith("/data/session")] == []
+    assert len(asked) == 1
     with page.expect_request("**/data/swarm*"):
         page.evaluate("""() => {
             globalThis.hiddenNow = false;

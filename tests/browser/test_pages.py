@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.browser.pages import opened, stands
-from tests.browser.places import PAGES, PLACES
+from tests.browser.places import PAGES, PLACES, TITLES
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -19,7 +19,7 @@ MOST_STOPS = 12
 @pytest.mark.parametrize(("address", "heading"), PAGES.items())
 def test_every_page_opens_under_its_own_address_without_an_error(page: Page, address: str, heading: str) -> None:
     opened(page, address, heading)
-    assert page.title() == f"{heading} - Covista"
+    assert page.title() == f"{TITLES.get(heading, heading)} - Covista"
     assert page.locator("h1").count() == 1
     assert page.locator("html").get_attribute("lang") == "en-US"
 

@@ -22,6 +22,11 @@ def partners(page: Page) -> tuple[str, str]:
     return best["a"], best["b"]
 
 
+def plane(support: int, x: float, z: float) -> dict[str, Any]:
+    """A plane of a pair, as the station tells it."""
+    return {"normal": [x, 0.0, z], "offset_m": 1.5, "support": support, "polygon_a": [], "polygon_b": []}
+
+
 def opened(page: Page, a: str, b: str) -> Page:
     page.goto(f"/dashboard/pairs/{a}/{b}")
     return page
@@ -45,16 +50,18 @@ def test_both_pictures_stand_beside_each_other_with_what_is_known(page: Page) ->
 
 def test_planes_are_listed_with_points_where_pictures_show_them(page: Page) -> None:
     a, b = partners(page)
-    with page.expect_response("**/data/pair/look*") as answered:
-        opened(page, a, b)
-    page.get_by_label("Pictures").select_option("held")
-    told = answered.value.json()
+    told = page.request.get(f"/dashboard/data/pair/look?a={a}&b={b}").json()
     assert [picture["problem"] for picture in told["pictures"]] == [None, None]
-    section = page.locator("section", has=page.locator("#cv-planes"))
-    if told["pair"]["planes"]:
-        expect(section.locator("tbody tr")).to_have_count(len(told["pair"]["planes"]))
-    else:
-        expect(section).to_contain_text("None")
+    told["pair"]["planes"] = [plane(90, 0.0, 1.0), plane(40, 1.0, 0.0), plane(12, 0.8, 0.6)]
+    page.route("**/data/pair/look*", lambda route: route.fulfill(json=told))
+    opened(page, a, b)
+    rows = page.locator("section", has=page.locator("#cv-planes")).locator("tbody tr")
+    expect(rows).to_contain_text(["90", "40", "12"])
+    expect(rows).to_contain_text(["level", "upright", "sloping"])
+    expect(rows.last).to_contain_text("0.80, 0.00, 0.60")
+    told["pair"]["planes"] = []
+    expect(page.locator("section", has=page.locator("#cv-planes"))).to_contain_text("None")
+    expect(rows).to_have_count(0)
 
 
 def test_pictures_are_not_sent_again_while_they_are_the_same(page: Page) -> None:

@@ -22,8 +22,8 @@ _CELLS = 60_000
 # Of a long time so many moments are looked at: more than that can hardly be told apart on a screen.
 _MOMENTS = 300
 _MOST_GAPS = 100
-# Of so many robots at most the order is the best that there is.
-_FEW = 120
+# Of so many robots at most the order is the best that there is; beyond the other, it is that of the last groups.
+_FEW, _MANY = 120, 300
 # Who were together for so much of their time stand in the order of names.
 _ALIKE = 0.98
 _MS = 1_000_000
@@ -79,7 +79,10 @@ def revisions(archive: Archive, since_ns: int, until_ns: int) -> Revisions:
     found: list[GroupsReport] = []
     gaps: list[Gap] = []
     cursor: str | None = None
-    limit = max(1, min(_PAGE, _CELLS // max(1, _read(first))))
+    newest = archive.groups_at(until_ns)
+    # The history may begin within the time, and swarms grow.
+    size = max(1, _read(first), 0 if newest is None else _read([newest]))
+    limit = max(1, min(_PAGE, _CELLS // size))
     while True:
         page = archive.groups(since_ns, until_ns, cursor, limit)
         found += page.items
@@ -88,7 +91,7 @@ def revisions(archive: Archive, since_ns: int, until_ns: int) -> Revisions:
         if cursor is None:
             return Revisions((*first, *found), tuple(gaps[:_MOST_GAPS]), thinned=False)
         if _read(found) >= _CELLS:
-            return _thinned(archive, since_ns, until_ns, first)
+            return _thinned(archive, since_ns, until_ns, first, size)
 
 
 def order(runs: dict[str, list[tuple[int, str | None]]], until_ms: int) -> list[str]:
@@ -96,6 +99,9 @@ def order(runs: dict[str, list[tuple[int, str | None]]], until_ms: int) -> list[
     robots = sorted(runs, key=_natural)
     if len(robots) < 3:
         return robots
+    if len(robots) > _MANY:
+        # What follows takes the square of them, each time that somebody looks.
+        return sorted(robots, key=lambda robot: _last_label(runs[robot]))
     together = _together([runs[robot] for robot in robots], until_ms)
     apart = 1.0 - together
     np.fill_diagonal(apart, 0.0)
@@ -115,19 +121,17 @@ def order(runs: dict[str, list[tuple[int, str | None]]], until_ms: int) -> list[
     return [robots[k] for block in blocks for k in sorted(block)]
 
 
-def _thinned(archive: Archive, since_ns: int, until_ns: int, first: list[GroupsReport]) -> Revisions:
-    size = max(1, _read(first))
+def _thinned(archive: Archive, since_ns: int, until_ns: int, first: list[GroupsReport], size: int) -> Revisions:
+    """What was in force as each part of the time ended, so that what stood for long is never missed."""
     moments = max(20, min(_MOMENTS, _CELLS // size))
     found = list(first)
     gaps: list[Gap] = []
     for k in range(moments):
         begin, end = (since_ns + (until_ns - since_ns) * step // moments for step in (k, k + 1))
-        page = archive.groups(begin, end, None, 1)
-        found += page.items
-        gaps += [gap for gap in page.gaps if gap not in gaps]
-    last = archive.groups_at(until_ns)
-    if last is not None and found and last.time > found[-1].time:
-        found.append(last)
+        gaps += [gap for gap in archive.groups(begin, end, None, 1).gaps if gap not in gaps]
+        last = archive.groups_at(end)
+        if last is not None and (not found or last.revision != found[-1].revision):
+            found.append(last)
     return Revisions(tuple(found), tuple(gaps[:_MOST_GAPS]), thinned=True)
 
 
@@ -151,6 +155,12 @@ def _together(runs: Sequence[Sequence[tuple[int, str | None]]], until_ms: int) -
     own = np.diag(shared)
     either = np.maximum(own[:, None] + own[None, :] - shared, 1e-9)
     return np.asarray(np.clip(shared / either, 0.0, 1.0), np.float64)
+
+
+def _last_label(runs: Sequence[tuple[int, str | None]]) -> tuple[bool, list[tuple[bool, int, str]]]:
+    """The group that a robot stood in last, to sort by; who stood in none come last."""
+    label = runs[-1][1]
+    return not label, _natural(label or "")
 
 
 def _natural(name: str) -> list[tuple[bool, int, str]]:

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from covista_schemas.keys import ID_PATTERN
 from fastapi import APIRouter, Query, Request, Response
 from pydantic_core import to_json
 
 from covista_service.access import Door, Scope
 from covista_service.access.scopes import covers
 from covista_service.access.sessions import COOKIE
+from covista_service.dashboard.data_pairs import RobotQuery
 from covista_service.dashboard.data_pairs import router as pairs_router
 from covista_service.dashboard.sources import Sources, SourcesNow
 from covista_service.dashboard.why import why
 
 JSON = "application/json"
-RobotQuery = Annotated[str, Query(pattern=f"^{ID_PATTERN}$")]
 
 router = APIRouter(prefix="/data", include_in_schema=False)
 router.include_router(pairs_router)

@@ -14,13 +14,13 @@ from covista_service.dashboard.sources import SourcesNow
 from covista_service.station.options import NS_PER_S
 
 _JSON = "application/json"
-_RobotQuery = Annotated[str, Query(pattern=f"^{ID_PATTERN}$")]
+RobotQuery = Annotated[str, Query(pattern=f"^{ID_PATTERN}$")]
 
 router = APIRouter(prefix="/pair")
 
 
 @router.get("")
-async def facts(sources: SourcesNow, a: _RobotQuery, b: _RobotQuery) -> Response:
+async def facts(sources: SourcesNow, a: RobotQuery, b: RobotQuery) -> Response:
     """What is known of two robots, as often as a mouse moves; a `problem` where they are no pair.
 
     That is no error, of which browsers would complain each second that somebody looks at a robot that is not there.
@@ -34,7 +34,7 @@ async def facts(sources: SourcesNow, a: _RobotQuery, b: _RobotQuery) -> Response
 
 @router.get("/look")
 async def look(
-    sources: SourcesNow, a: _RobotQuery, b: _RobotQuery, newest: bool = False, known: Annotated[str, Query()] = ""
+    sources: SourcesNow, a: RobotQuery, b: RobotQuery, newest: bool = False, known: Annotated[str, Query()] = ""
 ) -> Response:
     """Both keyframes with the common field, and the planes, of one moment; without them for who has that version.
 

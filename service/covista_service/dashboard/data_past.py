@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from typing import Annotated, Any
 
@@ -13,7 +12,7 @@ from pydantic_core import to_json
 
 from covista_service.dashboard.bands import bands
 from covista_service.dashboard.past_frames import REACH_S, nanoseconds, past_frame
-from covista_service.dashboard.sources import Sources, SourcesNow
+from covista_service.dashboard.sources import SourcesNow
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _LATEST_MS = 253_370_764_800_000
@@ -29,12 +28,13 @@ async def past(sources: SourcesNow, moment: Annotated[AwareDatetime, Query(alias
     # What is still to come is as it is now.
     time_ns = min((moment - _EPOCH) // timedelta(microseconds=1) * 1000, time.time_ns())
     snapshot = sources.loop.snapshot()
-    archive = sources.archive
+    now_ns = time.time_ns()
 
     def found() -> dict[str, Any]:
-        return {"station": sources.name, **past_frame(archive.moment(time_ns, REACH_S), snapshot, time_ns)}
+        then = sources.moments.at(sources.archive, time_ns, REACH_S, now_ns)
+        return {"station": sources.name, **past_frame(then, snapshot, time_ns)}
 
-    return await _read(sources, found)
+    return _told(await sources.moments.run(lambda: to_json(found())))
 
 
 @router.get("/bands")
@@ -54,9 +54,9 @@ async def groups_over_time(
         now = {"station": sources.name, "now_ms": now_ns // 1_000_000}
         return {**now, **bands(sources.archive, min(since_ns, until_ns), until_ns)}
 
-    return await _read(sources, found)
+    return _told(await sources.readers.run(lambda: to_json(found())))
 
 
-async def _read(sources: Sources, found: Callable[[], dict[str, Any]]) -> Response:
-    """Read and written in a thread: a thousand robots are much text."""
-    return Response(await sources.readers.run(lambda: to_json(found())), media_type="application/json")
+def _told(text: bytes) -> Response:
+    """What was written in a thread: a thousand robots are much text."""
+    return Response(text, media_type="application/json")

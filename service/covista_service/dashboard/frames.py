@@ -100,7 +100,7 @@ def swarm_frame(snapshot: Snapshot, rows: Rows) -> dict[str, Any]:
             "reason": [reasons.get(view.id) for view in views],
             "at_m": [row.at_m for row in told],
             "view": [row.corners for row in told],
-            "silent_s": [_silent_s(view, snapshot.wall_ns) for view in views],
+            "silent_s": [silence_s(view, snapshot.wall_ns) for view in views],
             "off_deg": [row.off_deg for row in told],
         },
     }
@@ -119,7 +119,8 @@ def corners(camera: Camera, pose: Pose) -> list[float]:
     return np.round(rays[:, :2], _DECIMALS_M).ravel().tolist()
 
 
-def _silent_s(view: RobotView, wall_ns: int) -> float | None:
+def silence_s(view: RobotView, wall_ns: int) -> float | None:
+    """For how long a robot has not been heard; None if it never was."""
     return None if view.last_seen_ns is None else round(max(0.0, (wall_ns - view.last_seen_ns) / NS_PER_S), 1)
 
 

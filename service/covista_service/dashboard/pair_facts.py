@@ -8,10 +8,10 @@ from typing import Any
 from covista_schemas.reports import FoundBy, PairSummary, Status
 
 from covista_service.answers import brief_pair_report, find_pair, find_robot
+from covista_service.dashboard.frames import silence_s
 from covista_service.dashboard.robot_words import spoken
 from covista_service.grouping.similarity import closeness
 from covista_service.station.events import Keyframe
-from covista_service.station.options import NS_PER_S
 from covista_service.station.snapshot import PairView, RobotView, Snapshot
 
 _HOW = {
@@ -71,7 +71,7 @@ def _presence(snapshot: Snapshot, robots: tuple[RobotView, RobotView]) -> Iterat
     for robot in robots:
         if robot.status is Status.LIVE:
             continue
-        silent_s = _silent_s(snapshot, robot)
+        silent_s = silence_s(robot, snapshot.wall_ns)
         since = "" if silent_s is None else f", silent for {spoken(silent_s)}"
         word = "is gone" if robot.status is Status.GONE else "is stale"
         yield f"{robot.id} {word}{since}: what is told of it is from before."
@@ -92,7 +92,7 @@ def _robot(snapshot: Snapshot, robot: RobotView, view: PairView) -> dict[str, An
         "id": robot.id,
         "status": robot.status,
         "group": robot.group,
-        "silent_s": _silent_s(snapshot, robot),
+        "silent_s": silence_s(robot, snapshot.wall_ns),
         "picture": None if keyframe is None else _picture(keyframe),
     }
 
@@ -104,8 +104,3 @@ def _picture(keyframe: Keyframe) -> str | None:
     if keyframe.thumbnail:
         return "thumbnail"
     return None if keyframe.features is None else "features"
-
-
-def _silent_s(snapshot: Snapshot, robot: RobotView) -> float | None:
-    last_ns = robot.last_seen_ns
-    return None if last_ns is None else round(max(0.0, (snapshot.wall_ns - last_ns) / NS_PER_S), 1)

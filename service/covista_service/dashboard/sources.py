@@ -13,6 +13,7 @@ from covista_service.access import Gate
 from covista_service.answers.past import Archive
 from covista_service.dashboard.frames import Frames
 from covista_service.dashboard.looks import Looks
+from covista_service.dashboard.recent_moments import RecentMoments
 from covista_service.dashboard.rounds import Rounds
 from covista_service.loop import Loop
 from covista_service.loop.rooms import Room
@@ -36,6 +37,7 @@ class Sources:
     gate: Gate
     archive: Archive
     readers: Room = field(default_factory=lambda: Room(at_once=2, waiting=20))
+    moments: RecentMoments = field(default_factory=RecentMoments)
     frames: Frames = field(default_factory=Frames)
     listeners: Callable[[], int] = lambda: 0
     given_up: Callable[[], Mapping[str, int]] = dict

@@ -105,6 +105,43 @@ def test_the_last_state_of_a_thinned_time_is_exact(pages_desk: PagesDesk, monkey
     assert standing_at(told["runs"], "r1", ms(100)) == "g2"
 
 
+def test_what_stood_for_long_is_drawn_where_it_had_come_just_after_another(
+    pages_desk: PagesDesk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(subject, "_CELLS", 100)
+    monkeypatch.setattr(subject, "_PAGE", 20)
+    busy = [groups(k, k / 10, {"g1": ["r1", "r2"]}) for k in range(1, 100)]
+    # Both in one part of the thinned time, and then nothing for very long.
+    pages_desk.write(*busy, groups(100, 501, {"g1": ["r1", "r2"]}), groups(101, 501.1, {"g2": ["r1"], "g1": ["r2"]}))
+    pages_desk.write(groups(102, 990, {"g1": ["r1", "r2"]}))
+    told = bands(pages_desk.archive, ns(0), ns(1000))
+    assert told["thinned"]
+    assert standing_at(told["runs"], "r1", ms(501.1)) == "g2"
+    assert standing_at(told["runs"], "r1", ms(980)) == "g2"
+    assert told["runs"]["r1"][-2:] == [(ms(501.1), "g2"), (ms(990), "g1")]
+
+
+def test_no_more_is_read_where_the_time_begins_before_the_history(
+    pages_desk: PagesDesk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(subject, "_CELLS", 500)
+    robots = [f"r{k}" for k in range(50)]
+    pages_desk.write(*(groups(k, k, {"g1": robots}) for k in range(1, 150)))
+    archive, cells = pages_desk.archive, 0
+    read = archive.groups
+
+    def counted(*arguments: object) -> object:
+        nonlocal cells
+        page = read(*arguments)  # type: ignore[arg-type]
+        cells += subject._read(page.items)
+        return page
+
+    monkeypatch.setattr(archive, "groups", counted)
+    assert bands(archive, ns(-1000), ns(200))["thinned"]
+    # What tells that it is too much, and then a revision of each part at most.
+    assert cells <= 2 * 500 + 20 * 52
+
+
 def test_gaps_come_with_their_reason_once(pages_desk: PagesDesk, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(subject, "_PAGE", 2)
     pages_desk.write(*(groups(k, k, {"g1": ["r1"]}) for k in range(1, 20)))
@@ -138,6 +175,13 @@ def test_who_were_together_for_long_stand_nearer_than_who_were_for_short() -> No
     found = order(runs, 1000)
     assert abs(found.index("r1") - found.index("r3")) == 1
     assert abs(found.index("r2") - found.index("r4")) == 1
+
+
+def test_very_many_robots_stand_in_the_order_of_their_last_groups() -> None:
+    names = [f"r{k}" for k in range(subject._MANY + 2)]
+    runs: Runs = {name: [(0, "g1"), (500, f"g{10 - k % 2 * 8}")] for k, name in enumerate(names)}
+    runs |= {"r0": [(0, "g2"), (900, None)], "r1": [(0, "g2"), (900, ABSENT)]}
+    assert order(runs, 1000) == [*names[3::2], *names[2::2], "r0", "r1"]
 
 
 def test_the_page_asks_for_the_last_minutes_or_since(pages_desk: PagesDesk) -> None:

@@ -17,6 +17,7 @@ export default {
   components: { GroupMark, PairBrief, PairHistory, PairPicture, PlanesTable },
   props: { a: String, b: String },
   setup(props) {
+    document.title = `${props.a} and ${props.b} - Covista`;
     const pair = computed(() => [props.a, props.b]);
     // What is wrong with the address itself.
     const wrong = computed(() => {
