@@ -107,6 +107,7 @@ export default {
       <p v-if="!valid" class="cv-problem" role="alert">{{ robot }} is no id of a robot: one has small letters, digits, _ and -, such as r1. <a :href="page('/')">The swarm</a></p>
       <p v-else-if="problem && !words" class="cv-problem" role="alert">{{ problem }}. Trying again.</p>
       <p v-else-if="!words">Asking the station.</p>
+      <p v-else-if="problem" class="cv-problem" role="alert">What you see is from before: {{ problem }}. Trying again.</p>
       <p v-if="words && !words.known" class="cv-card" role="status"><b>No robot {{ robot }} is known now.</b> It has not come since the station started, or was silent
         for so long that it is forgotten. When it sends something, it is shown here. <a :href="page('/')">The swarm</a></p>
       <section v-if="shows" class="cv-card cv-robot-head" :class="'cv-is-' + report.status" aria-labelledby="cv-robot-id">

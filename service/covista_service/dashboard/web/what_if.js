@@ -135,12 +135,16 @@ export default {
       });
     };
     const askUndo = async () => {
+      if (busy.value) return;
+      busy.value = true;
       // Others may have changed them since the last look.
       try {
         proposal.take(await asked(rest("/settings")));
       } catch (error) {
         applyTrouble.value = `Nothing was changed: ${error.message}.`;
         return;
+      } finally {
+        busy.value = false;
       }
       if (overtaken.value.length) undoing.value = true;
       else await undo();
