@@ -83,7 +83,7 @@ def test_who_logs_out_is_out_on_all_pages(stranger: Visitor, locked: LockedStati
     stands(other, "Swarm")
     page.get_by_role("button", name="Log out reader").click()
     page.get_by_label("Token").wait_for()
-    notice(other).get_by_text("You are not logged in any more.").wait_for()
+    notice(other).get_by_text("You are not logged in any more").wait_for()
     other.get_by_role("link", name="Log in").click()
     other.get_by_label("Token").wait_for()
     page.go_back()
@@ -98,7 +98,7 @@ def test_a_revoked_token_ends_its_pages_at_once(stranger: Visitor, locked: Locke
     log_in(page, token)
     stands(page, "Swarm")
     locked.station.revoke("passing")
-    notice(page).get_by_text("You are not logged in any more.").wait_for()
+    notice(page).get_by_text("You are not logged in any more").wait_for()
     page.reload()
     page.get_by_label("Token").wait_for()
 

@@ -272,7 +272,7 @@ def test_a_station_that_does_not_answer_is_told_at_the_top_and_nothing_breaks(
     tried(page)
     page.route(asked, lambda route: route.abort("connectionrefused"))
     say(page, "alpha", "0.8")
-    said(page, "The station has not answered for")
+    said(page, "The station has not answered since")
     page.get_by_role("button", name="Apply ...").click()
     confirm(page, "Apply")
     said(page, "^No answer came: look below whether the settings are in force")

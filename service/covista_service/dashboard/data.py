@@ -10,6 +10,7 @@ from pydantic_core import to_json
 from covista_service.access import Door, Scope
 from covista_service.access.scopes import covers
 from covista_service.access.sessions import COOKIE
+from covista_service.answers import NotKnownError
 from covista_service.dashboard.data_pairs import RobotQuery
 from covista_service.dashboard.data_pairs import router as pairs_router
 from covista_service.dashboard.sources import Sources, SourcesNow
@@ -35,8 +36,11 @@ async def swarm(sources: SourcesNow, matrix: Annotated[int | None, Query()] = No
 
 @router.get("/why")
 async def reasons(sources: SourcesNow, a: RobotQuery, b: RobotQuery) -> Response:
-    """Why two robots are in one group, or are not."""
-    return answer({"sentences": why(sources.loop.snapshot(), a, b)})
+    """Why two robots are in one group, or are not; a `problem`, and no error, where one of them is not known."""
+    try:
+        return answer({"sentences": why(sources.loop.snapshot(), a, b)})
+    except NotKnownError as error:
+        return answer({"sentences": [], "problem": error.detail})
 
 
 def answer(found: object) -> Response:

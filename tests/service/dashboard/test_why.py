@@ -5,6 +5,7 @@ from covista_service.station.events import SurveyPair
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.service.dashboard.conftest import PagesDesk
 from tests.service.station.scenes import BACK, NOTHING, Found, Scene, measured, pose
 
 # Two couples, a long way from each other.
@@ -74,3 +75,10 @@ def test_every_pair_has_an_answer_first_and_whole_sentences(scene: Scene, order:
         assert line.endswith(".")
         assert "nan" not in line
         assert "None" not in line
+
+
+def test_a_page_that_asks_for_who_is_forgotten_gets_an_answer_and_no_error(pages_desk: PagesDesk) -> None:
+    pages_desk.scene.send("r1")
+    pages_desk.scene.settle()
+    assert pages_desk.data("/why?a=r1&b=r9") == {"sentences": [], "problem": "no robot 'r9' is known"}
+    assert pages_desk.data("/why?a=r1&b=r1") == {"sentences": ["r1 is one robot."]}

@@ -5,6 +5,7 @@ import EventList, { KINDS } from "covista/event_list.js";
 import GroupMark from "covista/group_mark.js";
 import { msOf, spoken } from "covista/moments.js";
 import Neighbours from "covista/neighbours.js";
+import { isId } from "covista/pair_facts.js";
 import { newestEvents } from "covista/past_asking.js";
 import { pulse } from "covista/pulse.js";
 import RobotAccounts from "covista/robot_accounts.js";
@@ -13,7 +14,6 @@ import { Samples } from "covista/samples.js";
 const [EVERY_MS, EVENTS_MS, FORGOTTEN_MS, SOON_MS] = [1000, 5000, 5000, 100];
 const WEEK_MS = 604800000;
 const MOST_EVENTS = 100;
-const IS_ID = /^[a-z0-9][a-z0-9_-]{0,62}$/;
 // Less in common is none to speak of.
 const LEAST = 0.01;
 const GROUPED = ["join", "moved", "split", "merge"];
@@ -24,7 +24,7 @@ export default {
   props: { robot: { type: String, required: true } },
   setup(props) {
     document.title = `${props.robot} - Covista`;
-    const valid = IS_ID.test(props.robot);
+    const valid = isId(props.robot);
     const [words, report, pairs] = [shallowRef(null), shallowRef(null), shallowRef(null)];
     const [problem, unread] = [ref(""), ref("")];
     const rates = reactive({ keyframes: null, poses: null, missing: null });
@@ -107,6 +107,7 @@ export default {
       <p v-if="!valid" class="cv-problem" role="alert">{{ robot }} is no id of a robot: one has small letters, digits, _ and -, such as r1. <a :href="page('/')">The swarm</a></p>
       <p v-else-if="problem && !words" class="cv-problem" role="alert">{{ problem }}. Trying again.</p>
       <p v-else-if="!words">Asking the station.</p>
+      <p v-else-if="problem" class="cv-problem" role="alert">What you see is from before: {{ problem }}. Trying again.</p>
       <p v-if="words && !words.known" class="cv-card" role="status"><b>No robot {{ robot }} is known now.</b> It has not come since the station started, or was silent
         for so long that it is forgotten. When it sends something, it is shown here. <a :href="page('/')">The swarm</a></p>
       <section v-if="shows" class="cv-card cv-robot-head" :class="'cv-is-' + report.status" aria-labelledby="cv-robot-id">

@@ -18,6 +18,7 @@ import SimilarityMatrix from "covista/similarity_matrix.js";
 const REASONS = { no_pose: "has told no pose yet", gone: "is gone" };
 // How long until a matrix of so many robots is asked for again: one of a thousand has 8 MB.
 const PAUSES_MS = [[60, 1000], [200, 2000], [500, 5000], [Infinity, 10000]];
+const LONG_MS = 60000;
 const GROUPS_MS = 1000;
 // Of more robots than these one may want to see a part.
 const MANY = 40;
@@ -39,7 +40,7 @@ export default {
     function ask(each) {
       const url = rest(`/similarity?matrix=${each}`);
       let last = null;
-      const beat = tagged(url, (found) => (last = found), { headers: { accept: "application/x-npy" }, kind: "arrayBuffer" });
+      const beat = tagged(url, (found) => (last = found), { headers: { accept: "application/x-npy" }, kind: "arrayBuffer", timeoutMs: LONG_MS });
       return async () => {
         const before = last;
         await beat();
@@ -49,7 +50,7 @@ export default {
       };
     }
     const pause = () => PAUSES_MS.find(([most]) => (told.value?.robots.length ?? 0) <= most)[1];
-    const beat = pulse(() => asking[kind.value](), pause, (error) => (problem.value = error?.status ? error.message : ""));
+    const beat = pulse(() => asking[kind.value](), pause, (error) => (problem.value = error ? `The matrix cannot be shown now: ${error.message}. Trying again.` : ""));
     watch(kind, () => {
       choose({ matrix: kind.value });
       beat();
@@ -125,8 +126,8 @@ export default {
           <option v-for="group in groups?.groups ?? []" :key="group.label" :value="group.label">{{ group.label }} ({{ group.robots.length }})</option></select></label>
         <p class="cv-soft">{{ MATRICES[kind].title }}.</p>
         <p v-if="problem" class="cv-problem" role="alert">{{ problem }}</p>
-        <p v-if="!matrix">Asking the station.</p>
-        <p v-else-if="!matrix.order.length">{{ missing.length ? 'No robot is here that has told a pose' : 'No robot has been heard yet' }}, so there is nothing to compare.</p>
+        <p v-if="!matrix && !problem">Asking the station.</p>
+        <p v-else-if="matrix && !matrix.order.length">{{ missing.length ? 'No robot is here that has told a pose' : 'No robot has been heard yet' }}, so there is nothing to compare.</p>
         <div v-show="matrix?.order.length">
           <scale-legend v-if="matrix" :measure="matrix.measure" :key="kind + matrix.measure.top"></scale-legend>
           <similarity-matrix :matrix="matrix" :chosen="pair" @hover="hovered = $event" @choose="pick" @open="open"></similarity-matrix>

@@ -1,20 +1,30 @@
 // At the top of every page: whether the station answers, light or dark, and the way out.
-import { computed, onMounted, ref, watch } from "vue";
-import { asked, data, heardOf, noteRestart, page, standing } from "covista/ask.js";
+import { computed, onMounted, onUnmounted, ref, watch } from "vue";
+import { asked, data, heardOf, noteRestart, page, root, standing } from "covista/ask.js";
 import { pulse } from "covista/pulse.js";
 
 const DARK = "covista-dark";
 const EVERY_MS = 2000;
+// What is asked here takes no time: without an answer the station hangs.
+const HANGS_MS = 4000;
+const OUT_MS = 10000;
+
+// The form to log in, which leads back to what is shown here.
+const logIn = () => page(`/log-in?next=${encodeURIComponent(location.pathname.slice(`${root}/dashboard`.length) + location.search)}`);
 
 export default {
   setup() {
     const session = ref(null);
-    const now = ref(Date.now());
-    pulse(async () => {
-      session.value = await asked(data("/session"));
+    const look = async () => {
+      session.value = await asked(data("/session"), { timeoutMs: HANGS_MS });
       heardOf(session.value.station);
-      now.value = Date.now();
-    }, EVERY_MS, () => (now.value = Date.now()));
+    };
+    pulse(look, EVERY_MS, () => {});
+    // Somebody may log in again on another page.
+    const outside = setInterval(() => {
+      if (standing.loggedOut && !document.hidden) look().then(() => (standing.loggedOut = false), () => {});
+    }, OUT_MS);
+    onUnmounted(() => clearInterval(outside));
     const kept = localStorage.getItem(DARK);
     onMounted(() => {
       if (kept !== null) Quasar.Dark.set(kept === "true");
@@ -25,22 +35,22 @@ export default {
       localStorage.setItem(DARK, dark);
     };
     // Nothing is let in any more that this page would try again and again.
-    watch(() => standing.loggedOut, () => globalThis.socket?.disconnect());
+    watch(() => standing.loggedOut, (out) => (out ? globalThis.socket?.disconnect() : globalThis.socket?.connect()));
     const words = computed(() => {
-      if (standing.loggedOut) return "You are not logged in any more.";
+      if (standing.loggedOut) return "You are not logged in any more: you have logged out, your token is revoked, or the station has restarted.";
       if (standing.lostSince !== null) {
-        const seconds = Math.max(0, Math.round((now.value - standing.lostSince) / 1000));
-        return `The station has not answered for ${seconds} s. What you see is from before; trying again.`;
+        return `The station has not answered since ${new Date(standing.lostSince).toLocaleTimeString()}. What you see is from before; trying again.`;
       }
-      if (standing.restartedAt) return `The station has restarted; connected again at ${standing.restartedAt.toLocaleTimeString()}.`;
-      return "";
+      const restarted = standing.restartedAt ? `The station has restarted; connected again at ${standing.restartedAt.toLocaleTimeString()}. ` : "";
+      const [trouble] = standing.troubles.values();
+      return restarted + (trouble ? `Part of this page may be from before: ${trouble}. Trying again.` : "");
     });
-    return { session, standing, noteRestart, words, turn, logIn: page("/log-in"), logOut: page("/session/end") };
+    return { session, standing, noteRestart, words, turn, logIn, logOut: page("/session/end") };
   },
   template: `
     <div class="cv-standing">
       <p v-if="words" class="cv-alarm" role="status">{{ words }}
-        <a v-if="standing.loggedOut" :href="logIn">Log in</a>
+        <a v-if="standing.loggedOut" :href="logIn()" @click="$event.currentTarget.href = logIn()">Log in</a>
         <button v-else-if="standing.restartedAt && standing.lostSince === null" @click="noteRestart(null)">Good</button>
       </p>
       <button class="cv-quiet" @click="turn">Light or dark</button>

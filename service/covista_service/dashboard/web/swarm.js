@@ -1,5 +1,5 @@
 // The swarm in one look: the map, the groups, and why two robots are apart or together.
-import { computed, ref } from "vue";
+import { computed, ref, watch } from "vue";
 import { asked, data, page } from "covista/ask.js";
 import { ago, byLabel, byName, percent } from "covista/looks.js";
 import { pulse } from "covista/pulse.js";
@@ -33,6 +33,10 @@ export default {
       if (chosen.value.includes(name)) chosen.value = chosen.value.filter((each) => each !== name);
       else chosen.value = [...chosen.value, name].slice(-2);
     };
+    // Who is forgotten is not chosen any more.
+    watch(names, (known) => {
+      if (chosen.value.some((name) => !known.includes(name))) chosen.value = chosen.value.filter((name) => known.includes(name));
+    });
     const pair = computed(() => {
       const [a, b] = chosen.value;
       return { a: a ?? names.value[0], b: b ?? names.value.find((name) => name !== (a ?? names.value[0])) };
@@ -73,7 +77,7 @@ export default {
         </section>
         <section v-if="robots.length" aria-labelledby="cv-missing">
           <h2 id="cv-missing">Missing</h2>
-          <p v-if="!missing.length && !quiet.length">Nobody: all {{ robots.length }} robots are live and in a group.</p>
+          <p v-if="!missing.length && !quiet.length">Nobody: {{ robots.length === 1 ? 'the only robot is' : `all ${robots.length} robots are` }} live and in a group.</p>
           <ul v-else class="cv-list">
             <li v-for="robot in missing" :key="robot.id">
               <button class="cv-robot" :class="'cv-' + robot.status" :aria-pressed="chosen.includes(robot.id)"
@@ -95,6 +99,7 @@ export default {
             <label>and <select :value="pair.b" @change="pick('b', $event.target.value)">
               <option v-for="name in names" :key="name">{{ name }}</option></select></label>
           </p>
+          <p v-if="why?.problem">The station says: {{ why.problem }}.</p>
           <p v-for="sentence in why?.sentences" :key="sentence">{{ sentence }}</p>
           <p class="cv-note">Similarity is 1 for robots that see the same from the same place, and 0 for those that share nothing and
             stand far apart.</p>

@@ -11,9 +11,16 @@ const SEEN = "covista-station";
 const RESTARTED = "covista-restarted";
 
 // How asking goes: shown at the top of every page.
-export const standing = reactive({ lostSince: null, station: null, restartedAt: noted(), loggedOut: false });
+export const standing = reactive({ lostSince: null, station: null, restartedAt: noted(), loggedOut: false, aheadMs: 0, troubles: new Map() });
 
 const TIMEOUT_MS = 10000;
+// One answer that is late says nothing of a station that gives others.
+const LOST_MS = 3000;
+let heardMs = Date.now();
+document.addEventListener("visibilitychange", () => {
+  // A hidden page asks nothing, and misses no answer.
+  if (!document.hidden && standing.lostSince === null) heardMs = Date.now();
+});
 
 // What the station answers where it refuses: a problem (RFC 9457).
 export class Refused extends Error {
@@ -24,12 +31,12 @@ export class Refused extends Error {
   }
 }
 
-// Nothing came back.
+// Nothing came back, or not all of it: what was asked for may have been done all the same.
 export class Lost extends Error {}
 
 // The answer, as JSON or as `kind` says; null where it is still that of `tag` (see `tagged`).
-export async function ask(url, { method = "GET", body, headers = {}, kind = "json", signal } = {}) {
-  let response;
+export async function ask(url, { method = "GET", body, headers = {}, kind = "json", timeoutMs = TIMEOUT_MS } = {}) {
+  let [response, value] = [null, null];
   try {
     response = await fetch(url, {
       method,
@@ -37,21 +44,31 @@ export async function ask(url, { method = "GET", body, headers = {}, kind = "jso
       headers: body === undefined ? headers : { "content-type": "application/json", ...headers },
       credentials: "same-origin",
       redirect: "error",
-      signal: signal ?? AbortSignal.timeout(TIMEOUT_MS),
+      signal: AbortSignal.timeout(timeoutMs),
     });
-  } catch (error) {
-    if (signal?.aborted) throw error;
-    standing.lostSince ??= Date.now();
+    heard(response);
+    if (response.ok) value = await response[kind]();
+  } catch {
+    if (Date.now() - heardMs >= LOST_MS) standing.lostSince ??= heardMs;
     throw new Lost("the station does not answer");
   }
-  standing.lostSince = null;
   if (response.status === 304) return null;
   if (!response.ok) {
     const problem = await response.json().catch(() => ({}));
     if (response.status === 401) standing.loggedOut = true;
     throw new Refused(response.status, problem);
   }
-  return { value: await response[kind](), tag: response.headers.get("etag") };
+  return { value, tag: response.headers.get("etag") };
+}
+
+// Now by the station's clock, to some two seconds.
+export const stationNow = () => Date.now() + standing.aheadMs;
+
+function heard(response) {
+  const ahead = Date.parse(response.headers.get("date")) - Date.now();
+  if (Math.abs(ahead - standing.aheadMs) > 2000) standing.aheadMs = ahead;
+  heardMs = Date.now();
+  standing.lostSince = null;
 }
 
 export const asked = async (url, options) => (await ask(url, options)).value;

@@ -1,8 +1,8 @@
 // The overlap of a pair over the last minutes: read once page by page, then what has come since.
 import { shallowRef, watch } from "vue";
-import { asked, rest } from "covista/ask.js";
+import { asked, rest, stationNow } from "covista/ask.js";
 import { isId } from "covista/pair_facts.js";
-import { pulse } from "covista/pulse.js";
+import { pulse, toTop } from "covista/pulse.js";
 
 const EVERY_MS = 2000;
 const PAGE = 1000;
@@ -53,11 +53,12 @@ export function usePairPast(pair, minutes) {
     return found;
   }
 
+  const tell = toTop();
   const beat = pulse(async () => {
     const [a, b] = pair.value ?? [];
     if (!isId(a) || !isId(b) || a === b) return;
     const wanted = `${a} ${b} ${minutes.value}`;
-    const now = Date.now();
+    const now = stationNow();
     const start = now - 60000 * minutes.value;
     if (wanted !== of) [held, gaps, readTo, of] = [[], [], null, wanted];
     try {
@@ -74,7 +75,7 @@ export function usePairPast(pair, minutes) {
       if (error.status) problem.value = error;
       throw error;
     }
-  }, EVERY_MS);
+  }, EVERY_MS, (error) => tell(error?.status ? null : error));
   watch([pair, minutes], ([now, span], [before, spanBefore]) => {
     if (String(now) === String(before) && span === spanBefore) return;
     past.value = null;

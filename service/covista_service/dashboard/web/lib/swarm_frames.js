@@ -1,7 +1,7 @@
 // The swarm, asked for twice a second; less often where it is large. Frames come as columns and leave here as robots.
 import { shallowRef } from "vue";
 import { asked, data, heardOf } from "covista/ask.js";
-import { pulse } from "covista/pulse.js";
+import { pulse, toTop } from "covista/pulse.js";
 
 const EVERY_MS = 400;
 const MANY = 300;
@@ -29,6 +29,7 @@ export function useSwarm() {
   const frame = shallowRef(null);
   let edges = [];
   let matrix = -1;
+  const tell = toTop();
   const beat = pulse(
     async () => {
       const found = await asked(data(`/swarm?matrix=${matrix}`));
@@ -41,6 +42,7 @@ export function useSwarm() {
     },
     () => (frame.value && frame.value.robots.length > MANY ? MANY_MS : EVERY_MS),
     (error) => {
+      tell(error);
       // Another station's revisions say nothing of what is shown.
       if (error) matrix = -1;
     },

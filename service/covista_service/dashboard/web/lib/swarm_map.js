@@ -150,7 +150,7 @@ export default {
       free();
     };
     const key = (event) => {
-      if (!keys[event.key] || event.ctrlKey || event.metaKey) return;
+      if (!keys[event.key] || event.ctrlKey || event.metaKey || event.altKey) return;
       keys[event.key]();
       event.preventDefault();
     };
