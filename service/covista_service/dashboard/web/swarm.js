@@ -77,7 +77,7 @@ export default {
         </section>
         <section v-if="robots.length" aria-labelledby="cv-missing">
           <h2 id="cv-missing">Missing</h2>
-          <p v-if="!missing.length && !quiet.length">Nobody: {{ robots.length === 1 ? 'the only robot is' : `all ${robots.length} robots are` }} live and in a group.</p>
+          <p v-if="!missing.length && !quiet.length">Nobody: {{ robots.length === 1 ? 'the only robot is' : 'all ' + robots.length + ' robots are' }} live and in a group.</p>
           <ul v-else class="cv-list">
             <li v-for="robot in missing" :key="robot.id">
               <button class="cv-robot" :class="'cv-' + robot.status" :aria-pressed="chosen.includes(robot.id)"
