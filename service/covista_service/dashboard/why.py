@@ -67,8 +67,6 @@ def _others(snapshot: Snapshot, a: RobotView, b: RobotView) -> Iterator[str]:
         return
     for one, group in ((a, b.group), (b, a.group)):
         yield _drawn_to(one, group, *(_mean(snapshot, place, one, each) for each in (one.group or "", group)))
-    if snapshot.groups.waiting and {a.id, b.id} & set(snapshot.groups.waiting):
-        yield "Other groups are proposed for them, and shown if that lasts."
 
 
 def _drawn_to(robot: RobotView, group: str, own: float | None, theirs: float | None) -> str:
@@ -78,7 +76,7 @@ def _drawn_to(robot: RobotView, group: str, own: float | None, theirs: float | N
     means = f"on average its similarity is {own:.2f} to its own group and {like_them}."
     if own > (theirs or 0):
         return f"{robot.id} belongs more to {robot.group}: {means}"
-    return f"{robot.id} stands between them: {means}"
+    return f"{robot.id} is now more like {group}, and moves there if that lasts: {means}"
 
 
 def _mean(snapshot: Snapshot, place: dict[str, int], robot: RobotView, group: str) -> float | None:

@@ -64,7 +64,7 @@ export default {
         <h2 id="cv-line" class="cv-headline" aria-live="polite">{{ line }}</h2>
         <p class="cv-soft">{{ now.robots }} As of {{ at }}.</p>
         <ul v-if="needs.length" class="cv-needs">
-          <li v-for="need in needs" :key="need.says.replace(/\b[\d.]+\b/g, '')" :class="'cv-need-' + need.level"><b>{{ LEVELS[need.level] }}</b>
+          <li v-for="need in needs" :key="need.says" :class="'cv-need-' + need.level"><b>{{ LEVELS[need.level] }}</b>
             <span>{{ need.says }} <i>{{ need.todo }}</i>
               <span v-if="need.robots.length"> Most concerned: <template v-for="(robot, k) in need.robots" :key="robot">{{ k ? ", " : "" }}<a :href="page('/robots/' + robot)">{{ robot }}</a></template>.</span></span></li>
         </ul>

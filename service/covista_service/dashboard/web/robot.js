@@ -5,7 +5,6 @@ import EventList, { KINDS } from "covista/event_list.js";
 import GroupMark from "covista/group_mark.js";
 import { msOf, spoken } from "covista/moments.js";
 import Neighbours from "covista/neighbours.js";
-import { isId } from "covista/pair_facts.js";
 import { newestEvents } from "covista/past_asking.js";
 import { pulse } from "covista/pulse.js";
 import RobotAccounts from "covista/robot_accounts.js";
@@ -14,6 +13,7 @@ import { Samples } from "covista/samples.js";
 const [EVERY_MS, EVENTS_MS, FORGOTTEN_MS, SOON_MS] = [1000, 5000, 5000, 100];
 const WEEK_MS = 604800000;
 const MOST_EVENTS = 100;
+const IS_ID = /^[a-z0-9][a-z0-9_-]{0,62}$/;
 // Less in common is none to speak of.
 const LEAST = 0.01;
 const GROUPED = ["join", "moved", "split", "merge"];
@@ -24,7 +24,7 @@ export default {
   props: { robot: { type: String, required: true } },
   setup(props) {
     document.title = `${props.robot} - Covista`;
-    const valid = isId(props.robot);
+    const valid = IS_ID.test(props.robot);
     const [words, report, pairs] = [shallowRef(null), shallowRef(null), shallowRef(null)];
     const [problem, unread] = [ref(""), ref("")];
     const rates = reactive({ keyframes: null, poses: null, missing: null });

@@ -1,6 +1,5 @@
 // What was: groups over time, what happened, and the swarm as it was at any time of it.
 import { computed, reactive, ref, watch } from "vue";
-import { write } from "covista/address.js";
 import { page } from "covista/ask.js";
 import EventList, { KINDS } from "covista/event_list.js";
 import GroupBands from "covista/group_bands.js";
@@ -46,7 +45,7 @@ export default {
     const strange = ref(wrong);
     const time = computed(() => shown.time);
     // Where the bands end; null is now, and goes on.
-    const untilMs = ref(shown.time === null ? null : Math.min(Date.now(), msOf(shown.time) + 500 * shown.span));
+    const untilMs = ref(shown.time === null ? null : msOf(shown.time) + 500 * shown.span);
     const kinds = () => KINDS.filter((each) => shown.show.includes(each.name)).flatMap((each) => each.kinds);
     const past = usePast(() => ({ spanMs: 1000 * shown.span, untilMs: untilMs.value }), kinds);
     const { frame, problem: unseen } = useMoment(time);
@@ -75,11 +74,7 @@ export default {
       // Nearly now is now, and goes on.
       untilMs.value = to >= nowMs() - 50 * shown.span && shown.time === null ? null : Math.min(nowMs(), to);
     };
-    watch(shown, () => write(addressOf(shown)));
-    // Nothing is known of what is to come, by the station's clock.
-    watch(past.bands, (bands) => {
-      if (bands && untilMs.value > bands.now_ms) untilMs.value = bands.now_ms;
-    });
+    watch(shown, () => history.replaceState(history.state, "", addressOf(shown)));
     watch([shown, untilMs], past.beat);
 
     const groups = computed(() => {

@@ -13,15 +13,6 @@ import WouldBe, { movers } from "covista/would_be.js";
 const EVERY_MS = 3000;
 const QUIET_MS = 200;
 const MOST_NAMED = 8;
-const DONE = "covista-applied";
-// A page is loaded anew after the station was away.
-function kept() {
-  try {
-    return JSON.parse(sessionStorage.getItem(DONE)) ?? [];
-  } catch {
-    return [];
-  }
-}
 
 const named = (robots) => {
   const first = robots.slice(0, MOST_NAMED).join(", ");
@@ -96,8 +87,7 @@ export default {
 
     const [applying, undoing, busy] = [ref(false), ref(false), ref(false)];
     // Newest last: what was applied here, and can be taken back.
-    const done = ref(kept());
-    watch(done, () => sessionStorage.setItem(DONE, JSON.stringify(done.value)), { deep: true });
+    const done = ref([]);
     const word = ref("");
     const told = ref(null);
     const send = async (asking, after) => {
@@ -213,7 +203,7 @@ export default {
       <confirm-box :open="applying" title="Apply these settings?" action="Apply" :busy="busy" @confirm="apply" @close="applying = false">
         <ul><li v-for="change in changes" :key="change.name">{{ says(change) }}</li></ul>
         <p v-if="summary">{{ summary }}</p>
-        <p>They hold at once for everybody, and after a restart too. You can undo it here as long as this tab is open.</p>
+        <p>They hold at once for everybody, and after a restart too. You can undo it here as long as this page is open.</p>
       </confirm-box>
       <confirm-box :open="undoing" title="Somebody else has changed them since" action="Undo all the same" :busy="busy" @confirm="undo" @close="undoing = false">
         <p>Since you applied yours: {{ overtaken.map(({ name, value }) => says({ name, value: live[name], was: value })).join("; ") }}. To undo now means:</p>

@@ -11,7 +11,7 @@ const SEEN = "covista-station";
 const RESTARTED = "covista-restarted";
 
 // How asking goes: shown at the top of every page.
-export const standing = reactive({ lostSince: null, station: null, restartedAt: noted(), loggedOut: false, aheadMs: 0, troubles: new Map() });
+export const standing = reactive({ lostSince: null, station: null, restartedAt: noted(), loggedOut: false, troubles: new Map() });
 
 const TIMEOUT_MS = 10000;
 // One answer that is late says nothing of a station that gives others.
@@ -46,7 +46,7 @@ export async function ask(url, { method = "GET", body, headers = {}, kind = "jso
       redirect: "error",
       signal: AbortSignal.timeout(timeoutMs),
     });
-    heard(response);
+    heard();
     if (response.ok) value = await response[kind]();
   } catch {
     if (Date.now() - heardMs >= LOST_MS) standing.lostSince ??= heardMs;
@@ -61,12 +61,7 @@ export async function ask(url, { method = "GET", body, headers = {}, kind = "jso
   return { value, tag: response.headers.get("etag") };
 }
 
-// Now by the station's clock, to some two seconds.
-export const stationNow = () => Date.now() + standing.aheadMs;
-
-function heard(response) {
-  const ahead = Date.parse(response.headers.get("date")) - Date.now();
-  if (Math.abs(ahead - standing.aheadMs) > 2000) standing.aheadMs = ahead;
+function heard() {
   heardMs = Date.now();
   standing.lostSince = null;
 }

@@ -1,5 +1,4 @@
 // Draws groups over time: a row a robot, coloured by its group, and above them the scale with what happened.
-import { inkOn, parts } from "covista/colour_scale.js";
 import { colourOf } from "covista/looks.js";
 import { marks } from "covista/moments.js";
 
@@ -10,8 +9,8 @@ const EVENT_Y = 12;
 const [LEAST_ROW, MOST_ROW] = [3, 22];
 const inks = (dark) =>
   dark
-    ? { paper: "#1b2128", ink: "#e8e8e8", soft: "#b3b9c0", line: "#37404a", none: "#7a848e" }
-    : { paper: "#ffffff", ink: "#1c1c1c", soft: "#565656", line: "#d4d4ce", none: "#8a8a82" };
+    ? { paper: "#1b2128", ink: "#e8e8e8", soft: "#b3b9c0", line: "#37404a", on: "#14181d", none: "#4a545e" }
+    : { paper: "#ffffff", ink: "#1c1c1c", soft: "#565656", line: "#d4d4ce", on: "#ffffff", none: "#c4c4bd" };
 
 export const rowHeight = (count) => Math.max(LEAST_ROW, Math.min(MOST_ROW, Math.floor(330 / Math.max(count, 1))));
 
@@ -109,7 +108,7 @@ function drawRow(context, scale, runs, top, height, above, look, dark) {
     const said = above.find((each) => each.label === label && Math.abs(each.left - left) < 2);
     written.push({ label, left });
     if (said) continue;
-    context.fillStyle = inkOn(parts(colourOf(label, dark)));
+    context.fillStyle = look.on;
     context.fillText(label, left + 4, top + height / 2);
   }
   return written;

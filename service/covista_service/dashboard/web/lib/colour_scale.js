@@ -4,8 +4,7 @@
 const STOPS = ["#2b1a52", "#3d3a82", "#366095", "#2e8494", "#3fa887", "#86c76b", "#d9e394", "#fcfae6"];
 const STEPS = 256;
 
-// [r, g, b] of #rrggbb.
-export const parts = (colour) => [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
+const parts = (colour) => [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
 
 // The colour [r, g, b] of a share from 0 to 1.
 export function colourAt(share, dark) {

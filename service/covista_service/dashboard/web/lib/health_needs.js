@@ -2,8 +2,6 @@
 const SLOW_MS = 500;
 const SLOW_SHARE = 0.05;
 const BUSY_SHARE = 0.9;
-// Less is too little to alarm anybody.
-const LEAST_MS = 20000;
 const ORDER = { bad: 0, warn: 1, note: 2 };
 
 export const rounded = (rate) => (rate === null ? "..." : rate > 0 && rate < 10 ? rate.toFixed(1) : `${Math.round(rate)}`);
@@ -14,15 +12,15 @@ export const totalOf = (key) => (answer) => answer.counts.find((each) => each.ke
 export function countsNow(answer, samples) {
   return answer.counts
     .map((each) => ({ ...each, rate: samples.rate(totalOf(each.key)) }))
-    .map((each) => ({ ...each, grave: each.bearable !== null && (samples.rate(totalOf(each.key), LEAST_MS) ?? 0) > each.bearable }))
+    .map((each) => ({ ...each, grave: each.bearable !== null && (each.rate ?? 0) > each.bearable }))
     .sort((a, b) => b.grave - a.grave || (b.rate ?? 0) - (a.rate ?? 0) || b.total - a.total);
 }
 
 function latencyNeeds(samples) {
   const read = (name) => (answer) => answer.latency[name];
   const found = [];
-  const mean = samples.ratio(read("sum_s"), read("count"), LEAST_MS);
-  const slow = samples.ratio(read("slow"), read("count"), LEAST_MS);
+  const mean = samples.ratio(read("sum_s"), read("count"));
+  const slow = samples.ratio(read("slow"), read("count"));
   if (mean !== null && (1000 * mean > SLOW_MS || slow > SLOW_SHARE)) {
     found.push({
       level: "warn", robots: [],
@@ -30,7 +28,7 @@ function latencyNeeds(samples) {
       todo: "More comes than the station can take: have robots send less often, or give it more workers.",
     });
   }
-  const busy = samples.rate((answer) => answer.turns_s, LEAST_MS);
+  const busy = samples.rate((answer) => answer.turns_s);
   if (busy !== null && busy / 60 > BUSY_SHARE) {
     found.push({ level: "warn", robots: [], says: "The main loop has no rest: too many messages or robots.", todo: "Have robots send less often." });
   }

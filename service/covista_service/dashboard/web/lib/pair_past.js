@@ -1,6 +1,6 @@
 // The overlap of a pair over the last minutes: read once page by page, then what has come since.
 import { shallowRef, watch } from "vue";
-import { asked, rest, stationNow } from "covista/ask.js";
+import { asked, rest } from "covista/ask.js";
 import { isId } from "covista/pair_facts.js";
 import { pulse, toTop } from "covista/pulse.js";
 
@@ -58,7 +58,7 @@ export function usePairPast(pair, minutes) {
     const [a, b] = pair.value ?? [];
     if (!isId(a) || !isId(b) || a === b) return;
     const wanted = `${a} ${b} ${minutes.value}`;
-    const now = stationNow();
+    const now = Date.now();
     const start = now - 60000 * minutes.value;
     if (wanted !== of) [held, gaps, readTo, of] = [[], [], null, wanted];
     try {

@@ -1,6 +1,5 @@
 // Settings that somebody tries, beside those in force. They stand in the address, so that they can be handed on.
 import { computed, reactive, ref, shallowRef, watch } from "vue";
-import { write } from "covista/address.js";
 import { differing, flat, fromAddress, same, toAddress } from "covista/settings_words.js";
 
 export function useProposal() {
@@ -55,7 +54,7 @@ export function useProposal() {
   watch([changes, choices], ([now]) => {
     if (!live.value || !choices.value.length) return;
     const query = now.map(({ name, value }) => `${name}=${encodeURIComponent(toAddress(value))}`).join("&");
-    write(location.pathname + (query ? `?${query}` : "") + location.hash);
+    history.replaceState(history.state, "", location.pathname + (query ? `?${query}` : "") + location.hash);
   });
   return { choices, live, changes, others, unread, valueOf, set, reset, noted, take, given, read };
 }

@@ -15,18 +15,17 @@ export class Samples {
     this.all = [...this.all.filter(({ at }) => atMs - at < KEPT_MS), { at: atMs, answer }];
   }
 
-  // A minute, or as much of one as was watched, of what `read` finds in an answer; null before there are two answers, or before
-  // `leastMs` were watched: one message is no rate.
-  rate(read, leastMs = 0) {
+  // A minute, or as much of one as was watched, of what `read` finds in an answer; null before there are two answers.
+  rate(read) {
     const last = this.all.at(-1);
     const first = this.all.find(({ at }) => last.at - at <= RATE_MS);
-    if (!last || first === last || last.at - first.at < leastMs) return null;
+    if (!last || first === last) return null;
     return (Math.max(0, (read(last.answer) ?? 0) - (read(first.answer) ?? 0)) * 60000) / (last.at - first.at);
   }
 
   // How much more of `what` for each of `of` in that time; null where there was none.
-  ratio(what, of, leastMs = 0) {
-    const [more, each] = [this.rate(what, leastMs), this.rate(of, leastMs)];
+  ratio(what, of) {
+    const [more, each] = [this.rate(what), this.rate(of)];
     return each ? more / each : null;
   }
 

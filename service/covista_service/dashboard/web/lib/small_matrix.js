@@ -106,7 +106,7 @@ export default {
       if (!of || !by || of === by) pointed.value = "";
       else pointed.value = sentence(of.id, by.id, shares.value.get(row * count + column) ?? 0);
     };
-    const sentence = (of, by, share) => (share ? `${by} sees ${percent(share)} of ${of}'s view.` : `${by} sees less than 2 % of ${of}'s view, or this pair is not among the strongest.`);
+    const sentence = (of, by, share) => (share ? `${by} sees ${percent(share)} of ${of}'s view.` : `${by} sees nothing of ${of}'s view that is known.`);
     const words = computed(() => `Matrix of ${robots.value.length} robots: in each row, how much of its robot's view the others see. ${pairs.value.length} pairs are listed below.`);
     return { canvas, pointed, pairs, words, move, percent, page };
   },

@@ -150,7 +150,7 @@ export default {
       free();
     };
     const key = (event) => {
-      if (!keys[event.key] || event.ctrlKey || event.metaKey || event.altKey) return;
+      if (!keys[event.key] || event.ctrlKey || event.metaKey) return;
       keys[event.key]();
       event.preventDefault();
     };
@@ -178,7 +178,7 @@ export default {
       <figcaption class="cv-legend">
         <group-mark v-for="label in labels" :key="label" :label="label"></group-mark>
         <span>filled: live</span><span>dashed: stale, silent for a while</span><span>crossed out: gone</span>
-        <span>line: views in common, the thicker the more</span><span>wedge: field of view</span>
+        <span>line: views in common, the thicker the more</span><span>wedge: field of view, its beginning</span><span>tail: the last minute's way</span>
       </figcaption>
     </figure>`,
 };
