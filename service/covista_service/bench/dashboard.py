@@ -1,8 +1,8 @@
 """What do open dashboards cost the station, and does their map move smoothly?
 
-The cost is that of what pages ask for, in latency, by clients that do no more than ask: a browser beside the station, on
-the same two cores, would take more than it asks for. Smoothness is that of a real browser, which has those cores and no graphics
-card to draw with. Runs only when it is named, for it needs Playwright and a browser.
+The cost is that of what pages ask for, in latency, by clients that do no more than ask: a browser beside the station,
+on the same two cores, would take more than it asks for. Smoothness is that of a real browser, which has those cores and
+no graphics card to draw with. Runs only when it is named, for it needs Playwright and a browser.
 """
 
 from __future__ import annotations
