@@ -12,7 +12,7 @@ STACK := $(COMPOSE) --file docker/compose.yaml
 TESTS := $(BIN)/pytest --numprocesses=auto --maxprocesses=4 --dist=loadfile
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help demo test check api-test fuzz soak bench screenshots up down compose-test fault-test
+.PHONY: help demo test check page-test api-test fuzz soak bench screenshots up down compose-test fault-test
 
 help: ## Say what there is to make
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1: \2/p' Makefile
@@ -21,8 +21,8 @@ demo: .venv/.demo ## A station and six simulated rovers, until Ctrl-C
 	@echo "demo: a station and a simulated swarm; Ctrl-C ends both"
 	@exec $(BIN)/covista-station demo
 
-test: .venv/.dev ## All tests that need no container
-	@echo "test: all tests that need no container"
+test: .venv/.dev ## All tests that need neither a container nor a browser
+	@echo "test: all tests that need neither a container nor a browser"
 	@$(TESTS)
 
 check: .venv/.dev ## Format, lint, types, contracts and tests: what must be green before a push
@@ -32,6 +32,10 @@ check: .venv/.dev ## Format, lint, types, contracts and tests: what must be gree
 	@$(BIN)/mypy
 	@said=$$($(BIN)/lint-imports) || { echo "$$said"; exit 1; }
 	@$(TESTS)
+
+page-test: .venv/.dev ## The dashboard's pages in a real browser, on a station that runs
+	@echo "page-test: all pages in a browser, some minutes"
+	@$(TESTS) -m browser tests/browser
 
 api-test: .venv/.dev ## Thousands of questions to every route, all answers held to the description
 	@echo "api-test: more than 5000 questions to a station, some minutes"

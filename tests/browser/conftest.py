@@ -35,10 +35,11 @@ class LockedStation:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Give tests of this folder, which wait for other programs, more time than others."""
+    """Mark the tests of this folder, and give them, which wait for other programs, more time than others."""
     for item in items:
         if Path(__file__).parent in item.path.parents:
             item.add_marker(pytest.mark.timeout(_PATIENCE_S))
+            item.add_marker(pytest.mark.browser)
 
 
 @pytest.fixture(scope="package")
