@@ -1,6 +1,6 @@
 """Pages tell all there is, once, in the order of time; what cannot be told is an error or a gap."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 
 import pytest
@@ -9,8 +9,6 @@ from covista_service.answers import past
 from covista_service.answers.past import CursorError, HistoryUnavailableError
 from covista_service.store import pages
 from covista_service.store.archive import Archive
-from covista_service.store.database import open_engine
-from covista_service.store.migrations import upgrade
 from covista_service.store.rows import Entry, PairEntry, TrackEntry, write
 from covista_service.store.tables import gaps
 from sqlalchemy import Engine, insert, text
@@ -46,22 +44,6 @@ def groups(revision: int, seconds: float) -> GroupsReport:
         scores=[],
         settings=LiveSettings(),
     )
-
-
-@pytest.fixture
-def engine(url: str) -> Iterator[Engine]:
-    engine = open_engine(url)
-    with engine.begin() as connection:
-        upgrade(connection)
-    yield engine
-    engine.dispose()
-
-
-@pytest.fixture
-def archive(engine: Engine, url: str) -> Iterator[Archive]:
-    archive = Archive(url)
-    yield archive
-    archive.close()
 
 
 def put(engine: Engine, *entries: Entry) -> None:

@@ -2,7 +2,6 @@
 
 import json
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -26,15 +25,6 @@ from tests.service.store.test_history import LiveSettings, ask, kept
 DAY_S = 86_400.0
 # No number is a whole one, which SQLite would keep in less room.
 WAY = tuple(0.1 + number for number in range(7))
-
-
-@pytest.fixture
-def engine(url: str) -> Iterator[Engine]:
-    engine = open_engine(url)
-    with engine.begin() as connection:
-        upgrade(connection)
-    yield engine
-    engine.dispose()
 
 
 def kept_of(engine: Engine, table: object, column: str) -> list[int]:

@@ -1,7 +1,6 @@
 """A moment of the past is what the last rows before it say, told by another way: all rows, one after the other."""
 
 import random
-from collections.abc import Iterator
 from itertools import pairwise
 
 import pytest
@@ -9,8 +8,6 @@ from covista_schemas.reports import FoundBy
 from covista_service.answers import past
 from covista_service.answers.past import HistoryUnavailableError
 from covista_service.store.archive import Archive
-from covista_service.store.database import open_engine
-from covista_service.store.migrations import upgrade
 from covista_service.store.rows import Entry, PairEntry, TrackEntry
 from covista_service.store.tables import pair_overlaps, tracks
 from sqlalchemy import Engine, event, insert, text
@@ -18,22 +15,6 @@ from sqlalchemy import Engine, event, insert, text
 from tests.service.store.test_archive import POSE, T0_NS, at, groups, ns, put, us
 
 REACH_S = 600.0
-
-
-@pytest.fixture
-def engine(url: str) -> Iterator[Engine]:
-    engine = open_engine(url)
-    with engine.begin() as connection:
-        upgrade(connection)
-    yield engine
-    engine.dispose()
-
-
-@pytest.fixture
-def archive(engine: Engine, url: str) -> Iterator[Archive]:
-    archive = Archive(url)
-    yield archive
-    archive.close()
 
 
 def point(robot: str, seconds: float, x_m: float = 1.0) -> TrackEntry:

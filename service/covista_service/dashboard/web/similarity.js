@@ -3,7 +3,7 @@ import { computed, ref, shallowRef, watch } from "vue";
 import { page, rest, tagged } from "covista/ask.js";
 import { choose, chosenIn } from "covista/address.js";
 import { MATRICES, measureOf } from "covista/colour_scale.js";
-import { byName } from "covista/looks.js";
+import { byName, REASONS } from "covista/looks.js";
 import { orderOf } from "covista/matrix_order.js";
 import { matrixOf } from "covista/npy.js";
 import { usePairFacts } from "covista/pair_facts.js";
@@ -15,7 +15,6 @@ import PairBrief from "covista/pair_brief.js";
 import ScaleLegend from "covista/scale_legend.js";
 import SimilarityMatrix from "covista/similarity_matrix.js";
 
-const REASONS = { no_pose: "has told no pose yet", gone: "is gone" };
 // How long until a matrix of so many robots is asked for again: one of a thousand has 8 MB.
 const PAUSES_MS = [[60, 1000], [200, 2000], [500, 5000], [Infinity, 10000]];
 const LONG_MS = 60000;

@@ -1,14 +1,13 @@
 // The swarm in one look: the map, the groups, and why two robots are apart or together.
 import { computed, ref, watch } from "vue";
 import { asked, data, page } from "covista/ask.js";
-import { ago, byLabel, byName, percent } from "covista/looks.js";
+import { ago, byLabel, byName, percent, REASONS } from "covista/looks.js";
 import { pulse } from "covista/pulse.js";
 import { useSwarm } from "covista/swarm_frames.js";
 import GroupMark from "covista/group_mark.js";
 import SwarmMap from "covista/swarm_map.js";
 
 const WHY_MS = 1000;
-const REASONS = { no_pose: "has told no pose yet", gone: "is gone" };
 
 export default {
   components: { GroupMark, SwarmMap },

@@ -41,6 +41,9 @@ export function trace(context, shape, x, y, r) {
   context.closePath();
 }
 
+// Why a robot stands in no group now.
+export const REASONS = { no_pose: "has told no pose yet", gone: "is gone" };
+
 // g2 before g10.
 export const byLabel = (a, b) => numberOf(a) - numberOf(b) || (a < b ? -1 : 1);
 export const byName = (a, b) => a.localeCompare(b, "en", { numeric: true });
