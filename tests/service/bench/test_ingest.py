@@ -1,3 +1,4 @@
+import math
 from collections import Counter
 from collections.abc import Iterator
 
@@ -91,9 +92,13 @@ def test_a_flood_ends_with_its_parent() -> None:
         assert flooder.process.returncode is not None
 
 
-def test_what_a_message_costs_is_told_kind_by_kind() -> None:
-    costs_us = ingest.costs_us(1.0, {"poses": 2000, "garbage_short": 2000, "keyframes": 20, "garbage_long": 500}, 1)
+def test_what_a_message_costs_is_what_the_station_spends_beyond_its_own_needs() -> None:
+    assert ingest.cost_us(0.75, 0.25, 1000) == 500.0
+    # Of few messages, what the station does by itself may be more in the seconds without than in those with them.
+    assert ingest.cost_us(0.25, 0.75, 1000) == -500.0
+
+
+def test_what_a_message_costs_is_told_kind_by_kind_and_round_by_round() -> None:
+    costs_us = ingest.costs_us(0.5, {"poses": 2000, "garbage_short": 2000, "keyframes": 20, "garbage_long": 500}, 2)
     assert set(costs_us) == {"poses", "garbage_short", "keyframes", "garbage_long"}
-    assert all(len(rounds) == 1 and rounds[0] >= 0 for rounds in costs_us.values())
-    # Of few messages, what the station does by itself beside them may hide all.
-    assert costs_us["garbage_short"][0] > 0
+    assert all(len(rounds) == 2 and all(map(math.isfinite, rounds)) for rounds in costs_us.values())

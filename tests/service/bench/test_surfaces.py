@@ -17,4 +17,4 @@ def test_surfaces_are_timed_by_stage(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(surface, "MARKS_MS", {300: 5.0})
     rows = list(surface.rows(long=False))
     assert [row.case for row in rows] == ["surface_300", "surface_300_agree", "surface_300_interpolate"]
-    assert rows[0].median > rows[1].median > 0
+    assert all(row.median > 0 for row in rows)
