@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -45,6 +46,8 @@ class RouterProcess:
     def stop(self) -> None:
         """Have it do nothing any more: what is sent to it stays in the kernel, and is lost if it is killed then."""
         self._process.send_signal(signal.SIGSTOP)
+        # Its threads go on until one of them has taken the signal, which takes a while on a busy machine.
+        os.waitid(os.P_PID, self._process.pid, os.WSTOPPED | os.WNOWAIT)
 
     def kill(self) -> None:
         """End it without a word."""

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from typing import Any
 
 import pytest
 import zenoh
@@ -161,9 +162,12 @@ def test_what_a_busy_subscriber_was_not_sent_it_asks_for(air: Air) -> None:
     heard: dict[str, list[int]] = {"all": [], "some": []}
     last, text = EVENTS_KEPT - 20, "x" * 40_000
     publisher = Publisher(air.station, "busy")
+    probe = air.station.declare_publisher(keys.events("busy"))
     with listening(LISTENERS, air.endpoint, "busy") as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
+        # What is told before the station's end knows of a subscriber, one without recovery never hears.
+        wait_until(lambda: is_heard(probe))
         try:
             publisher.take(News(Scene().snapshot, events(1, 1), False, ()))
             while not (heard["all"] and heard["some"]):
@@ -178,6 +182,12 @@ def test_what_a_busy_subscriber_was_not_sent_it_asks_for(air: Air) -> None:
             publisher.close()
     assert heard["all"] == list(range(1, last + 1))
     assert len(heard["some"]) < last
+
+
+def is_heard(publisher: zenoh.Publisher) -> bool:
+    # The stubs of zenoh call it a bool; it is an object that is always true.
+    status: Any = publisher.matching_status
+    return bool(status.matching)
 
 
 def note(heard: dict[str, list[int]], line: str) -> None:
