@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
+
+# Who shows groups by the numbers of their labels has few colours that all eyes tell apart: some seven.
+COLOURS = 7
 
 Members = frozenset[str]
 Grouping = Mapping[str, Members]
@@ -38,7 +41,8 @@ def follow(previous: Grouping, clusters: Iterable[Members], next_label: int) -> 
     """Name clusters so that as many robots as possible keep their label.
 
     A label goes to a cluster only with one of its robots. New labels are g1, g2, ... from `next_label`, never one
-    that was used before.
+    that was used before. Numbers are left out so that up to COLOURS groups which are there together differ modulo
+    COLOURS, and more of them are spread evenly, as far as groups that were there before allow.
     """
     ordered = sorted(clusters, key=lambda members: min(members))
     names = sorted(previous, key=_age)
@@ -48,12 +52,15 @@ def follow(previous: Grouping, clusters: Iterable[Members], next_label: int) -> 
         return Following({known[members]: members for members in ordered}, next_label)
     inherited = _assign([previous[name] for name in names], ordered)
     groups: dict[str, Members] = {}
+    worn = Counter(_number(names[row]) % COLOURS for row in inherited.values())
     for column, members in enumerate(ordered):
         if column in inherited:
             groups[names[inherited[column]]] = members
         else:
-            groups[f"g{next_label}"] = members
-            next_label += 1
+            number = min(range(next_label, next_label + COLOURS), key=lambda each: worn[each % COLOURS])
+            worn[number % COLOURS] += 1
+            groups[f"g{number}"] = members
+            next_label = number + 1
     return Following(groups, next_label)
 
 
@@ -73,6 +80,10 @@ def changes(before: Grouping, after: Grouping) -> list[Change]:
             found += [Change("moved", (robot,), (source, target)) for robot in moved]
     found += [Change("join", (robot,), (new[robot],)) for robot in sorted(new.keys() - old.keys())]
     return found
+
+
+def _number(label: str) -> int:
+    return int(label[1:])
 
 
 def _age(label: str) -> tuple[int, str]:

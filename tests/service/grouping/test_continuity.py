@@ -1,6 +1,8 @@
 """Labels stay with their groups, and what happened to groups has a name."""
 
-from covista_service.grouping.continuity import Change, changes, follow
+from collections import Counter
+
+from covista_service.grouping.continuity import COLOURS, Change, changes, follow
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -55,6 +57,26 @@ def test_among_equals_the_oldest_label_goes_to_the_first_cluster() -> None:
     assert follow(groups(g1="abcd"), [group("cd"), group("ab")], 2).groups == groups(g1="ab", g2="cd")
 
 
+def test_a_new_label_leaves_out_numbers_that_would_look_like_a_group_that_is_there() -> None:
+    assert follow(groups(g1="abcd"), [group("ab"), group("cd")], 8).groups == groups(g1="ab", g9="cd")
+    # Another label than that of a group that ends may look like it.
+    assert follow(groups(g1="ab"), [group("cd")], 8).groups == groups(g8="cd")
+
+
+@given(st.lists(groupings, min_size=1, max_size=20))
+def test_groups_that_are_there_together_differ_modulo_the_colours(history: list[list[frozenset[str]]]) -> None:
+    following = follow({}, [], 1)
+    for clusters in history:
+        following = follow(following.groups, clusters, following.next_label)
+        assert len({int(label[1:]) % COLOURS for label in following.groups}) == len(clusters) <= COLOURS
+
+
+def test_more_groups_than_colours_are_spread_evenly() -> None:
+    many = [frozenset({f"y{number:02}"}) for number in range(20)]
+    worn = Counter(int(label[1:]) % COLOURS for label in follow(groups(g1="x"), [group("x"), *many], 9).groups)
+    assert set(worn.values()) == {3}
+
+
 @given(before=groupings, after=groupings)
 def test_following_keeps_every_cluster_once(before: list[frozenset[str]], after: list[frozenset[str]]) -> None:
     first = follow({}, before, 1)
@@ -62,7 +84,7 @@ def test_following_keeps_every_cluster_once(before: list[frozenset[str]], after:
     assert sorted(map(sorted, second.groups.values())) == sorted(map(sorted, after))
     fresh = second.groups.keys() - first.groups.keys()
     assert all(int(label[1:]) >= first.next_label for label in fresh)
-    assert second.next_label == first.next_label + len(fresh)
+    assert second.next_label == 1 + max([first.next_label - 1, *(int(label[1:]) for label in fresh)])
     assert all(first.groups[label] & second.groups[label] for label in second.groups.keys() - fresh)
     assert follow(second.groups, after, second.next_label) == second
 
