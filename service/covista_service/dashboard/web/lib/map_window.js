@@ -8,8 +8,6 @@ export class MapWindow {
     this.centre = [0, 0];
     this.pxPerM = 40;
     this.size = [1, 1];
-    // Whether it follows the swarm by itself.
-    this.fits = true;
   }
 
   px([x, y]) {
@@ -49,12 +47,10 @@ export class MapWindow {
     this.pxPerM = Math.min(5000, Math.max(0.05, this.pxPerM * factor));
     const after = this.metres(at);
     this.centre = [this.centre[0] + before[0] - after[0], this.centre[1] + before[1] - after[1]];
-    this.fits = false;
   }
 
   pan(dx, dy) {
     this.centre = [this.centre[0] - dx / this.pxPerM, this.centre[1] + dy / this.pxPerM];
-    this.fits = false;
   }
 
   // A round length for a bar of some `px` pixels: metres and pixels.
