@@ -1,5 +1,6 @@
 // Draws groups over time: a row a robot, coloured by its group, and above them the scale with what happened.
-import { colourOf } from "covista/looks.js";
+import { channels, inkOn } from "covista/colour_scale.js";
+import { colourOf, shapeOf, trace } from "covista/looks.js";
 import { marks } from "covista/moments.js";
 
 export const GUTTER = 58;
@@ -7,10 +8,11 @@ export const HEAD = 44;
 export const GLYPHS = { join: "+", leave: "−", split: "◁", merge: "▷", moved: "↕", status: "○", settings: "≡", warning: "!" };
 const EVENT_Y = 12;
 const [LEAST_ROW, MOST_ROW] = [3, 22];
+const MARK = 9;
 const inks = (dark) =>
   dark
-    ? { paper: "#1b2128", ink: "#e8e8e8", soft: "#b3b9c0", line: "#37404a", on: "#14181d", none: "#4a545e" }
-    : { paper: "#ffffff", ink: "#1c1c1c", soft: "#565656", line: "#d4d4ce", on: "#ffffff", none: "#c4c4bd" };
+    ? { paper: "#1b2128", ink: "#e8e8e8", soft: "#b3b9c0", line: "#37404a", none: "#8a949e" }
+    : { paper: "#ffffff", ink: "#1c1c1c", soft: "#565656", line: "#d4d4ce", none: "#767676" };
 
 export const rowHeight = (count) => Math.max(LEAST_ROW, Math.min(MOST_ROW, Math.floor(330 / Math.max(count, 1))));
 
@@ -103,15 +105,21 @@ function drawRow(context, scale, runs, top, height, above, look, dark) {
     context.fillRect(left, top, width, height - air);
     if (height < 12) continue;
     context.font = `650 ${Math.min(12, height - 2)}px system-ui, sans-serif`;
-    const room = context.measureText(label).width + 8;
+    const room = context.measureText(label).width + MARK + 9;
     if (width < room) continue;
     const said = above.find((each) => each.label === label && Math.abs(each.left - left) < 2);
     written.push({ label, left });
-    if (said) continue;
-    context.fillStyle = look.on;
-    context.fillText(label, left + 4, top + height / 2);
+    if (!said) drawLabel(context, label, left + 4, top + height / 2, dark);
   }
   return written;
+}
+
+// The shape of a group and its label, for who does not tell its colour from others.
+function drawLabel(context, label, x, y, dark) {
+  context.fillStyle = inkOn(channels(colourOf(label, dark)));
+  trace(context, shapeOf(label), x + MARK / 2, y, 0.4 * MARK);
+  context.fill();
+  context.fillText(label, x + MARK + 2, y);
 }
 
 function hatch(context, left, right, foot, look) {

@@ -4,13 +4,14 @@
 const STOPS = ["#2b1a52", "#3d3a82", "#366095", "#2e8494", "#3fa887", "#86c76b", "#d9e394", "#fcfae6"];
 const STEPS = 256;
 
-const parts = (colour) => [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
+// Of a colour as style sheets write it: [r, g, b].
+export const channels = (colour) => [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
 
 // The colour [r, g, b] of a share from 0 to 1.
 export function colourAt(share, dark) {
   const along = Math.min(1, Math.max(0, dark ? share : 1 - share)) * (STOPS.length - 1);
   const first = Math.min(STOPS.length - 2, Math.floor(along));
-  const [from, to] = [parts(STOPS[first]), parts(STOPS[first + 1])];
+  const [from, to] = [channels(STOPS[first]), channels(STOPS[first + 1])];
   return from.map((value, k) => Math.round(value + (along - first) * (to[k] - value)));
 }
 
