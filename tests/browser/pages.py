@@ -22,7 +22,7 @@ def opened(page: Page, address: str, heading: str) -> Page:
 def stands(page: Page, heading: str) -> None:
     """Wait until a page stands."""
     page.get_by_role("heading", level=1, name=heading, exact=True).wait_for()
-    page.get_by_role("button", name="Light or dark").wait_for()
+    page.get_by_role("button", name="Switch to").wait_for()
 
 
 def notice(page: Page) -> Locator:

@@ -71,8 +71,9 @@ def test_the_first_stop_of_the_keyboard_leads_past_what_all_pages_have(page: Pag
 def test_dark_is_kept_for_the_next_page(page: Page) -> None:
     opened(page, "/dashboard/", "Swarm")
     before = page.evaluate("getComputedStyle(document.body).backgroundColor")
-    page.get_by_role("button", name="Light or dark").click()
+    page.get_by_role("button", name="Switch to dark").click()
     page.wait_for_function("document.body.classList.contains('body--dark')")
     opened(page, "/dashboard/health", "Health")
     page.wait_for_function("document.body.classList.contains('body--dark')")
     assert page.evaluate("getComputedStyle(document.body).backgroundColor") != before
+    page.get_by_role("button", name="Switch to light").wait_for()

@@ -1,6 +1,7 @@
 // At the top of every page: whether the station answers, light or dark, and the way out.
 import { computed, onMounted, onUnmounted, ref, watch } from "vue";
 import { asked, data, heardOf, noteRestart, page, root, standing } from "covista/ask.js";
+import { onDark } from "covista/dark.js";
 import { pulse } from "covista/pulse.js";
 
 const DARK = "covista-dark";
@@ -29,10 +30,11 @@ export default {
     onMounted(() => {
       if (kept !== null) Quasar.Dark.set(kept === "true");
     });
+    const dark = onDark();
     const turn = () => {
-      const dark = !document.body.classList.contains("body--dark");
-      Quasar.Dark.set(dark);
-      localStorage.setItem(DARK, dark);
+      const wanted = !dark.value;
+      Quasar.Dark.set(wanted);
+      localStorage.setItem(DARK, wanted);
     };
     // Nothing is let in any more that this page would try again and again.
     watch(() => standing.loggedOut, (out) => (out ? globalThis.socket?.disconnect() : globalThis.socket?.connect()));
@@ -45,15 +47,15 @@ export default {
       const [trouble] = standing.troubles.values();
       return restarted + (trouble ? `Part of this page may be from before: ${trouble}. Trying again.` : "");
     });
-    return { session, standing, noteRestart, words, turn, logIn, logOut: page("/session/end") };
+    return { session, standing, noteRestart, words, dark, turn, logIn, logOut: page("/session/end") };
   },
   template: `
     <div class="cv-standing">
       <p v-if="words" class="cv-alarm" role="status">{{ words }}
         <a v-if="standing.loggedOut" :href="logIn()" @click="$event.currentTarget.href = logIn()">Log in</a>
-        <button v-else-if="standing.restartedAt && standing.lostSince === null" @click="noteRestart(null)">Good</button>
+        <button v-else-if="standing.restartedAt && standing.lostSince === null" @click="noteRestart(null)">OK</button>
       </p>
-      <button class="cv-quiet" @click="turn">Light or dark</button>
+      <button class="cv-quiet" @click="turn">{{ dark ? "Switch to light" : "Switch to dark" }}</button>
       <form v-if="session?.name" method="post" :action="logOut">
         <button class="cv-quiet" type="submit">Log out {{ session.name }}</button>
       </form>
