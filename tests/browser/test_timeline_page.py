@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from datetime import datetime
+from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -51,7 +51,16 @@ def opened(page: Page, query: str = "") -> Page:
     return page
 
 
+# The address follows within some tenths of a second.
+IN_ADDRESS = """() => {
+    const slider = document.querySelector(".cv-bands-slider");
+    return slider && new URL(location.href).searchParams.get("time") === (slider.dataset.time ?? null);
+}"""
+
+
 def time_of(page: Page) -> str | None:
+    """The time in the address, once it is the one that is looked at."""
+    page.wait_for_function(IN_ADDRESS)
     return next(iter(parse_qs(urlsplit(page.url).query).get("time", [])), None)
 
 
@@ -107,7 +116,7 @@ def test_events_are_told_newest_first_and_by_kind(page: Page, station: Any) -> N
     expect(page.get_by_text("Choose what to show.")).to_be_visible()
     page.get_by_role("checkbox", name="Settings").check()
     expect(page.locator(".cv-events-list li").first).to_contain_text("groups")
-    assert parse_qs(urlsplit(page.url).query)["show"] == ["Settings"]
+    expect(page).to_have_url(re.compile(r"show=Settings(&|$)"))
     newest, *_, oldest = [each["time"] for each in reversed(rest(station, "/events/history", kind="settings")["items"])]
     first, last = (page.locator(".cv-events-list a").nth(k).get_attribute("href") or "" for k in (0, -1))
     assert parse_qs(urlsplit(first).query)["time"] == [newest]
@@ -155,6 +164,31 @@ def test_dragging_over_the_bands_goes_back_and_live_returns(page: Page, station:
     assert before > 0
 
 
+def test_who_drags_on_and_on_writes_the_address_now_and_then_and_at_last(page: Page) -> None:
+    page.add_init_script("""window.written = 0; const write = history.replaceState.bind(history);
+        history.replaceState = (...all) => { window.written += 1; write(...all); }""")
+    opened(page)
+    slider = page.get_by_role("slider", name="Time")
+    before = page.evaluate("written")
+    dragged = """slider => { for (let k = 1; k <= 120; k++) {
+        slider.value = Number(slider.max) - k * 1000; slider.dispatchEvent(new Event("input")); } }"""
+    slider.evaluate(dragged)
+    last = time_of(page)
+    assert last is not None
+    assert slider.get_attribute("data-time") == last
+    assert 1 <= page.evaluate("written") - before <= 3
+
+
+def test_what_is_still_to_come_is_not_shown_as_known(page: Page) -> None:
+    opened(page, f"?time={(datetime.now(UTC) + timedelta(hours=2)).strftime('%Y-%m-%dT%H:%M:%SZ')}")
+    expect(page.get_by_role("alert")).to_contain_text("still to come")
+    expect(page.get_by_role("heading", name="Now")).to_be_visible()
+    slider = page.get_by_role("slider", name="Time")
+    assert float(slider.get_attribute("max") or "inf") <= 1000 * datetime.now(UTC).timestamp()
+    expect(page.locator(GROUPS).first).to_be_visible()
+    assert time_of(page) is None
+
+
 def test_robots_that_are_asked_for_can_be_reached(page: Page) -> None:
     opened(page)
     expect(page.locator(f"{GROUPS} a").first).to_have_attribute("href", re.compile(r"/dashboard/robots/r\d$"))
@@ -180,7 +214,7 @@ def test_spans_are_chosen_zoomed_and_kept_in_the_address(page: Page) -> None:
     page.get_by_role("button", name="1 h").click()
     page.get_by_role("button", name="Zoom time in").click()
     expect(page.get_by_text("30 min are shown")).to_be_visible()
-    assert parse_qs(urlsplit(page.url).query)["span"] == ["1800"]
+    expect(page).to_have_url(re.compile(r"span=1800(&|$)"))
     page.reload()
     expect(page.get_by_text("30 min are shown")).to_be_visible()
     page.get_by_role("button", name="5 min").click()

@@ -46,7 +46,8 @@ async def groups_over_time(
 ) -> Response:
     """Groups until a time, or now: of the last `span_s`, or since. Raises HistoryUnavailableError or FullError."""
     now_ns = time.time_ns()
-    until_ns = now_ns if until_ms is None else nanoseconds(until_ms)
+    # Of what is still to come no groups are known.
+    until_ns = now_ns if until_ms is None else min(now_ns, nanoseconds(until_ms))
     since_ns = until_ns - round(span_s * 1e9) if since_ms is None else nanoseconds(since_ms)
     since_ns = max(0, since_ns, until_ns - _LONGEST_S * 10**9)
 

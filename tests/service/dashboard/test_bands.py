@@ -1,6 +1,7 @@
 """Bands tell in which group each robot stood when, and long times are thinned and say so."""
 
 import random
+import time
 from itertools import pairwise
 
 import pytest
@@ -191,6 +192,8 @@ def test_the_page_asks_for_the_last_minutes_or_since(pages_desk: PagesDesk) -> N
     assert told["runs"]["r1"][0] == [ms(3), "g3"]
     since = pages_desk.data(f"/bands?since_ms={ms(6)}&until_ms={ms(8)}")
     assert since["runs"]["r1"] == [[ms(6), "g6"], [ms(7), "g7"]]
+    ahead = pages_desk.data(f"/bands?span_s=60&until_ms={time.time_ns() // 10**6 + 3_600_000}")
+    assert ahead["until_ms"] == ahead["now_ms"]
     now = pages_desk.data("/bands?span_s=60")
     assert now["until_ms"] == now["now_ms"]
     assert now["since_ms"] == now["now_ms"] - 60_000

@@ -1,5 +1,5 @@
 // What was: groups over time, what happened, and the swarm as it was at any time of it.
-import { computed, reactive, ref, watch } from "vue";
+import { computed, ref, watch } from "vue";
 import { page } from "covista/ask.js";
 import EventList, { KINDS } from "covista/event_list.js";
 import GroupBands from "covista/group_bands.js";
@@ -10,101 +10,59 @@ import { length, msOf, spoken, zone } from "covista/moments.js";
 import { usePast } from "covista/past_asking.js";
 import SmallMatrix from "covista/small_matrix.js";
 import SwarmMap from "covista/swarm_map.js";
+import { addressOf, LONGEST_S, SHORTEST_S, useWindow } from "covista/timeline_window.js";
 
 const SPANS = [[300, "5 min"], [3600, "1 h"], [21600, "6 h"], [86400, "24 h"], [604800, "7 d"]];
-const [SHORTEST_S, LONGEST_S] = [10, 2592000];
 const REASONS = { no_pose: "had told no pose yet", gone: "was gone" };
 
-// What the address says: ?time=2026-05-04T12:30:15Z&span=3600&show=Groups,Robots
-function fromAddress() {
-  const query = new URLSearchParams(location.search);
-  const [time, span, show] = ["time", "span", "show"].map((name) => query.get(name));
-  const seconds = Number(span);
-  const valid = time !== null && Number.isFinite(msOf(time));
-  return {
-    time: valid ? (/[zZ]|[+-]\d\d:\d\d$/.test(time) ? time : new Date(msOf(time)).toISOString()) : null,
-    span: seconds >= SHORTEST_S && seconds <= LONGEST_S ? seconds : 300,
-    show: show === null ? ["Groups", "Robots"] : KINDS.map((each) => each.name).filter((name) => show.split(",").includes(name)),
-    wrong: time !== null && !valid,
-  };
+function groupsOf(robots) {
+  const found = new Map();
+  for (const { id, group } of robots) {
+    if (group) found.set(group, [...(found.get(group) ?? []), id]);
+  }
+  return [...found].sort(([a], [b]) => byLabel(a, b)).map(([label, members]) => ({ label, robots: members.sort(byName) }));
 }
 
-function addressOf({ time, span, show }) {
-  const query = new URLSearchParams();
-  if (time !== null) query.set("time", time);
-  if (span !== 300) query.set("span", span);
-  if (show.join() !== "Groups,Robots") query.set("show", show.join());
-  return page(`/timeline${query.size ? `?${query}` : ""}`);
+function emptyWords(frame, time) {
+  if (!frame || frame.robots.length) return "";
+  return time === null ? "No robot has been heard yet." : "Nothing is kept of that time: the station was not there yet, or it is too long ago.";
+}
+
+function clockWords(aheadMs) {
+  if (Math.abs(aheadMs) < 5000) return "";
+  return ` The station's clock is ${ago(Math.abs(aheadMs) / 1000)} ${aheadMs > 0 ? "ahead of" : "behind"} this one.`;
 }
 
 export default {
   components: { EventList, GroupBands, GroupMark, SmallMatrix, SwarmMap },
   setup() {
-    const { wrong, ...begun } = fromAddress();
-    const shown = reactive(begun);
-    const strange = ref(wrong);
-    const time = computed(() => shown.time);
-    // Where the bands end; null is now, and goes on.
-    const untilMs = ref(shown.time === null ? null : msOf(shown.time) + 500 * shown.span);
+    const nowMs = () => Date.now() + past.aheadMs.value;
+    const { settle, ...part } = useWindow(nowMs, () => past.bands.value?.until_ms ?? null);
+    const { shown, untilMs } = part;
     const kinds = () => KINDS.filter((each) => shown.show.includes(each.name)).flatMap((each) => each.kinds);
     const past = usePast(() => ({ spanMs: 1000 * shown.span, untilMs: untilMs.value }), kinds);
-    const { frame, problem: unseen } = useMoment(time);
-    const nowMs = () => Date.now() + past.aheadMs.value;
-
-    const scrub = (to) => {
-      strange.value = false;
-      const bands = past.bands.value;
-      // Who looks at the past wants it to stand still.
-      if (untilMs.value === null) untilMs.value = bands?.until_ms ?? nowMs();
-      shown.time = to;
-      if (bands && (msOf(to) < untilMs.value - 1000 * shown.span || msOf(to) > untilMs.value)) around(msOf(to));
-    };
-    const around = (ms) => (untilMs.value = Math.min(nowMs(), ms + 500 * shown.span));
-    const live = () => {
-      strange.value = false;
-      shown.time = untilMs.value = null;
-    };
-    const spanned = (seconds) => {
-      shown.span = Math.round(Math.min(LONGEST_S, Math.max(SHORTEST_S, seconds)));
-      if (shown.time !== null) around(msOf(shown.time));
-      else if (untilMs.value !== null) untilMs.value = Math.min(nowMs(), untilMs.value);
-    };
-    const shift = (share) => {
-      const to = (untilMs.value ?? nowMs()) + share * 1000 * shown.span;
-      // Nearly now is now, and goes on.
-      untilMs.value = to >= nowMs() - 50 * shown.span && shown.time === null ? null : Math.min(nowMs(), to);
-    };
-    watch(shown, () => history.replaceState(history.state, "", addressOf(shown)));
     watch([shown, untilMs], past.beat);
+    watch(past.bands, settle, { once: true });
+    const { frame, problem: unseen } = useMoment(computed(() => shown.time));
 
-    const groups = computed(() => {
-      const found = new Map();
-      for (const { id, group } of frame.value?.robots ?? []) {
-        if (group) found.set(group, [...(found.get(group) ?? []), id]);
-      }
-      return [...found].sort(([a], [b]) => byLabel(a, b)).map(([label, robots]) => ({ label, robots: robots.sort(byName) }));
-    });
-    const missing = computed(() => (frame.value?.robots ?? []).filter((robot) => !robot.group));
+    const robots = computed(() => frame.value?.robots ?? []);
+    const groups = computed(() => groupsOf(robots.value));
+    const missing = computed(() => robots.value.filter((robot) => !robot.group));
     const heading = computed(() => (shown.time === null ? "Now" : spoken(msOf(shown.time), nowMs())));
-    const empty = computed(() => {
-      if (!frame.value || frame.value.robots.length) return "";
-      return shown.time === null ? "No robot has been heard yet." : "Nothing is kept of that time: the station was not there yet, or it is too long ago.";
-    });
-    const unheard = computed(() => frame.value?.past && frame.value.robots.length && frame.value.robots.every((robot) => !robot.at));
+    const empty = computed(() => emptyWords(frame.value, shown.time));
+    const unheard = computed(() => frame.value?.past && robots.value.length && robots.value.every((robot) => !robot.at));
+    const otherClock = computed(() => clockWords(past.aheadMs.value));
     const linkOf = (to) => addressOf({ ...shown, time: to });
-    const clockWords = computed(() =>
-      Math.abs(past.aheadMs.value) < 5000 ? "" : ` The station's clock is ${ago(Math.abs(past.aheadMs.value) / 1000)} ${past.aheadMs.value > 0 ? "ahead of" : "behind"} this one.`,
-    );
     const chosen = ref([]);
     const choose = (name) => (chosen.value = chosen.value.includes(name) ? [] : [name]);
     return {
-      SPANS, REASONS, LONGEST_S, SHORTEST_S, shown, strange, untilMs, ...past, frame, unseen, scrub, live, spanned, shift, groups, missing, heading, empty,
-      unheard, linkOf, clockWords, chosen, choose, page, spoken, length, zone,
+      SPANS, REASONS, LONGEST_S, SHORTEST_S, ...part, ...past, frame, unseen, groups, missing, heading, empty, unheard, linkOf, otherClock, chosen, choose,
+      page, spoken, length, zone,
     };
   },
   template: `
     <div class="cv-timeline">
-      <p v-if="strange" class="cv-problem" role="alert">The time in the address is none, so this is now. One looks like 2026-05-04T12:30:15Z.</p>
+      <p v-if="strange" class="cv-problem" role="alert">{{ strange }}</p>
       <div class="cv-timeline-bar">
         <div role="group" aria-label="How long" class="cv-pick">
           <button v-for="[seconds, words] in SPANS" :key="seconds" :aria-pressed="shown.span === seconds" @click="spanned(seconds)">{{ words }}</button>
@@ -123,7 +81,7 @@ export default {
       <template v-if="bands">
         <p v-if="!bands.robots.length">No groups are kept of this time. Choose a longer one, or go earlier.</p>
         <group-bands :bands="bands" :events="events.items" :time="shown.time" @scrub="scrub"></group-bands>
-        <p class="cv-soft">Times are in {{ zone() }}.{{ clockWords }}
+        <p class="cv-soft">Times are in {{ zone() }}.{{ otherClock }}
           <template v-if="bands.thinned">So long a time is thinned: groups are looked at now and then, and short changes between are not drawn. Zoom in to see all.</template></p>
         <ul v-if="bands.gaps.length" class="cv-list"><li v-for="gap in bands.gaps" :key="gap.since_ms + gap.reason">
           <span>Hatched: from {{ spoken(gap.since_ms) }} to {{ spoken(gap.until_ms) }} something is missing: {{ gap.reason }}.</span></li></ul>

@@ -1,11 +1,36 @@
 // What is chosen on a page, in its address: so that it can be sent to somebody.
-export const chosenIn = (name) => new URL(location.href).searchParams.get(name);
+
+// Browsers take some two hundred addresses in half a minute, and who drags a slider makes more.
+const LEAST_MS = 200;
+
+let [timer, waiting] = [null, null];
+
+export const chosenIn = (name) => new URL(waiting ?? location.href, location.href).searchParams.get(name);
+
+// The first at once, those that come soon after it as one.
+export function write(url) {
+  waiting = url;
+  if (timer !== null) return;
+  settle();
+  timer = setTimeout(() => {
+    timer = null;
+    if (waiting !== null) write(waiting);
+  }, LEAST_MS);
+}
+
+function settle() {
+  if (waiting !== null && new URL(waiting, location.href).href !== location.href) history.replaceState(history.state, "", waiting);
+  waiting = null;
+}
+
+// Who leaves finds it again on the way back.
+addEventListener("pagehide", settle);
 
 export function choose(values) {
-  const url = new URL(location.href);
+  const url = new URL(waiting ?? location.href, location.href);
   for (const [name, value] of Object.entries(values)) {
     if (value === null || value === undefined || value === "") url.searchParams.delete(name);
     else url.searchParams.set(name, value);
   }
-  if (url.href !== location.href) history.replaceState(history.state, "", url);
+  write(url.href);
 }

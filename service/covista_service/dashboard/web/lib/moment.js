@@ -28,7 +28,7 @@ export function useMoment(time) {
       while (time.value !== null && wanted !== time.value) {
         wanted = time.value;
         const found = await asked(data(`/past?time=${encodeURIComponent(wanted)}`));
-        if (time.value !== null) frame.value = { ...found, robots: robotsOf(found.robots), edges: edgesOf(found.edges), past: true, asked: wanted };
+        if (time.value !== null) frame.value = { ...found, robots: robotsOf(found.robots), edges: edgesOf(found.edges), past: true };
       }
       problem.value = "";
     } catch (error) {
