@@ -116,7 +116,7 @@ fault-test: .venv/.dev ## The faults five times, with a table of how soon each i
 
 # Here, so that the first start need not wait for a compiler.
 define warm
-echo "Compiling what is compiled (half a minute)" && $(BIN)/python -c 'from covista_service.workers import load; load()'
+echo "Compiling what is compiled (a minute or two)" && $(BIN)/python -c 'from covista_service.workers import load; load()'
 endef
 
 define need_engine

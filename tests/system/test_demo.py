@@ -68,18 +68,17 @@ class Demo:
 
 
 @contextmanager
-def started(tmp_path: Path, *arguments: str) -> Iterator[Demo]:
-    command = [
-        sys.executable, "-m", "covista_service", "demo", "--robots", "3",
-        "--api", f"127.0.0.1:{free_port()}", "--link", f"tcp/127.0.0.1:{free_port()}", *arguments,
-    ]  # fmt: skip
+def started(tmp_path: Path, *arguments: str, **where: str) -> Iterator[Demo]:
+    """A demo at free ports, unless arguments or the environment say others."""
+    command = [sys.executable, "-m", "covista_service", "demo", "--robots", "3", *arguments]
+    free = {"COVISTA_API": f"127.0.0.1:{free_port()}", "COVISTA_LINK": f"tcp/127.0.0.1:{free_port()}"}
     demo = Demo(
         subprocess.Popen(
             command,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            env={**os.environ, "TMPDIR": str(tmp_path)},
+            env={**os.environ, "TMPDIR": str(tmp_path), **free, **where},
         )
     )
     try:
@@ -135,4 +134,12 @@ def test_a_taken_port_is_one_line_that_names_the_flag(tmp_path: Path, flag: str)
             line = demo.wait_for(flag)
             assert address.rpartition(":")[2] in line
             assert demo.lines.get(timeout=START_S) is None
+            assert demo.process.wait(START_S) == 1
+
+
+def test_the_environment_says_where_too(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        address = f"127.0.0.1:{taken.getsockname()[1]}"
+        with started(tmp_path, COVISTA_API=address) as demo:
+            assert address.rpartition(":")[2] in demo.wait_for("--api")
             assert demo.process.wait(START_S) == 1

@@ -27,8 +27,12 @@ def demo(
         float | None, typer.Option(min=0, help="How long; without it until Ctrl-C.", show_default=False)
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same swarm.")] = 0,
-    api: Annotated[str, typer.Option(metavar="HOST:PORT", help="Where the REST interface listens.")] = "127.0.0.1:8000",
-    link: Annotated[str, typer.Option(metavar="ENDPOINT", help="Where zenoh listens.")] = "tcp/127.0.0.1:7447",
+    api: Annotated[
+        str, typer.Option(metavar="HOST:PORT", envvar="COVISTA_API", help="Where the REST interface listens.")
+    ] = "127.0.0.1:8000",
+    link: Annotated[
+        str, typer.Option(metavar="ENDPOINT", envvar="COVISTA_LINK", help="Where zenoh listens.")
+    ] = "tcp/127.0.0.1:7447",
     database: Annotated[
         str | None, typer.Option(metavar="URL", help="Keep the history there.  [default: a temporary file]")
     ] = None,
