@@ -2,8 +2,9 @@
 import { computed, ref } from "vue";
 import { choose, chosenIn } from "covista/address.js";
 import { percent } from "covista/looks.js";
+import { clock } from "covista/moments.js";
 import { usePairPast } from "covista/pair_past.js";
-import LineChart, { clock } from "covista/line_chart.js";
+import LineChart from "covista/line_chart.js";
 
 const SPANS = [[2, "2 min"], [10, "10 min"], [60, "1 h"]];
 const FOUND = { image: "found in images", predicted: "predicted", decayed: "old", unknown: "not known" };
