@@ -1,4 +1,5 @@
 // What other settings would make of the swarm, beside what is; nothing changes until somebody applies it.
+import { useApplied } from "covista/applied.js";
 import { useApplying } from "covista/applying.js";
 import { usePreview } from "covista/preview.js";
 import { useProposal } from "covista/proposal.js";
@@ -13,8 +14,11 @@ export default {
   components: { ConfirmBox, ScoreLines, SettingField, WouldBe },
   setup() {
     const proposal = useProposal();
-    const preview = usePreview(proposal);
-    return { ...proposal, ...preview, ...useVerdict(preview, proposal.changes), ...useApplying(proposal, preview), named, says };
+    const applied = useApplied();
+    const preview = usePreview(proposal, applied.recall);
+    return {
+      ...proposal, ...preview, ...applied, ...useVerdict(preview, proposal.changes), ...useApplying(proposal, preview, applied), named, says,
+    };
   },
   template: `
     <p v-if="!live" :class="trouble ? 'cv-problem' : 'cv-soft'" role="status">{{ trouble || "Asking the station." }}</p>
@@ -65,10 +69,10 @@ export default {
       <confirm-box :open="applying" title="Apply these settings?" action="Apply" :busy="busy" @confirm="apply" @close="applying = false">
         <ul><li v-for="change in changes" :key="change.name">{{ says(change) }}</li></ul>
         <p v-if="summary">{{ summary }}</p>
-        <p>They hold at once for everybody, and after a restart too. You can undo it here as long as this page is open.</p>
+        <p>They hold at once for everybody, and after a restart too. You can undo it in this tab as long as it is open and nobody else changes them.</p>
       </confirm-box>
       <confirm-box :open="undoing" title="Somebody else has changed them since" action="Undo all the same" :busy="busy" @confirm="undo" @close="undoing = false">
-        <p>Since you applied yours: {{ overtaken.map(({ name, value }) => says({ name, value: live[name], was: value })).join("; ") }}. To undo now means:</p>
+        <p>Since you applied yours: {{ overtaken.map(says).join("; ") }}. To undo now means:</p>
         <ul><li v-for="change in back" :key="change.name">{{ says(change) }}</li></ul>
       </confirm-box>
     </div>`,

@@ -1,8 +1,8 @@
 // Gives the station the settings that were tried, once somebody has said yes, and takes them back.
 import { computed, nextTick, ref } from "vue";
+import { overtakenIn } from "covista/applied.js";
 import { asked, Lost, rest } from "covista/ask.js";
-import { clock } from "covista/moments.js";
-import { patchOf, same, says } from "covista/settings_words.js";
+import { patchOf, same } from "covista/settings_words.js";
 
 // Sends changes, one after the other; `told` is the element that says so and is gone to then, `closed` is done in any case.
 function useSending(proposal, { operates, outdate, soon }, closed) {
@@ -35,38 +35,30 @@ function useSending(proposal, { operates, outdate, soon }, closed) {
   return { busy, applyTrouble, told, send };
 }
 
-// For `setup`. `preview` is what usePreview gives.
-export function useApplying(proposal, preview) {
+// For `setup`. `preview` is what usePreview gives, `applied` what useApplied does.
+export function useApplying(proposal, preview, applied) {
   const { live, changes } = proposal;
   // Questions that stand open.
   const [applying, undoing] = [ref(false), ref(false)];
   const { busy, applyTrouble, told, send } = useSending(proposal, preview, () => {
     applying.value = undoing.value = false;
   });
-  // Newest last: what was applied here, and can be taken back.
-  const done = ref([]);
-  const word = ref("");
 
   const apply = () => {
     const asking = changes.value.map(({ name, value, was }) => ({ name, value, was }));
     return send(asking, () => {
-      done.value.push(asking);
-      word.value = `Applied at ${clock(Date.now())}: ${asking.map(says).join("; ")}.`;
+      applied.applied(asking);
       proposal.reset();
     });
   };
-  const last = computed(() => done.value.at(-1) ?? []);
   // What others have made of it meanwhile.
-  const overtaken = computed(() => last.value.filter(({ name, value }) => !same(live.value[name], value)));
-  const back = computed(() => last.value
+  const overtaken = computed(() => overtakenIn(applied.last.value, live.value));
+  const back = computed(() => applied.last.value
     .map(({ name, was }) => ({ name, value: was, was: live.value[name] }))
     .filter(({ value, was }) => !same(value, was)));
   const undo = () => {
     const asking = back.value;
-    return send(asking, () => {
-      done.value.pop();
-      word.value = asking.length ? `Undone at ${clock(Date.now())}: ${asking.map(says).join("; ")}.` : "Somebody else has undone it already.";
-    });
+    return send(asking, () => applied.undone(asking));
   };
   const askUndo = async () => {
     if (busy.value) return;
@@ -83,5 +75,5 @@ export function useApplying(proposal, preview) {
     if (overtaken.value.length) undoing.value = true;
     else await undo();
   };
-  return { applying, undoing, busy, applyTrouble, told, done, word, apply, undo, askUndo, overtaken, back };
+  return { applying, undoing, busy, applyTrouble, told, apply, undo, askUndo, overtaken, back };
 }

@@ -16,8 +16,9 @@ function wordsOf(error) {
 }
 
 // For `setup`. Groups as they are (`now`), as they would be (`then`), and as they would be made anew under the settings
-// in force (`asIs`); the last two are null without changes. `soon` looks again, `outdate` says that settings were given.
-export function usePreview(proposal) {
+// in force (`asIs`); the last two are null without changes. `soon` looks again, `outdate` says that settings were given;
+// `heard` is told which start of the station answers, and the settings in force.
+export function usePreview(proposal, heard) {
   const { changes } = proposal;
   const sections = shallowRef([]);
   const [now, then, asIs] = [shallowRef(null), shallowRef(null), shallowRef(null)];
@@ -38,6 +39,7 @@ export function usePreview(proposal) {
       const [groups, session] = await Promise.all([asked(rest("/groups")), asked(data("/session"))]);
       if (turn !== given) return;
       operates.value = session.operates;
+      heard(session.station, groups.settings);
       now.value = groups;
       proposal.take(groups.settings);
       if (moved()) return soon();
