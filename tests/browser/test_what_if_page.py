@@ -78,6 +78,7 @@ def confirm(page: Page, action: str) -> None:
 
 def test_nothing_changes_until_it_is_applied_and_undo_brings_it_back(page: Page, station: Place) -> None:
     tried(page)
+    said(page, "^Move a slider or choose another value: .* Nothing changes until you press Apply")
     before = members(page, "now")
     assert len(before) == 2
     setting(page, "groups").get_by_role("combobox").select_option("number")

@@ -40,7 +40,7 @@ export default {
             <button v-if="done.length" type="button" :disabled="busy || !operates" @click="askUndo">Undo</button></p>
           <p v-if="applyTrouble" class="cv-problem" role="alert">{{ applyTrouble }}</p>
           <p v-if="trouble" class="cv-problem" role="alert">{{ trouble }}</p>
-          <p v-if="!changes.length">Try other settings: the groups that would be appear here. Nothing changes until you apply it.</p>
+          <p v-if="!changes.length">Move a slider or choose another value: the groups that would be are shown here, beside those that are. Nothing changes until you press Apply.</p>
           <template v-else>
             <p class="cv-summary" aria-live="polite">{{ summary }}</p>
             <p v-if="then?.note" class="cv-note">{{ then.note }}</p>
