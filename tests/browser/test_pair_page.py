@@ -1,7 +1,9 @@
 from __future__ import annotations
 
 import re
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qs, urlsplit
 
 import pytest
 
@@ -117,6 +119,18 @@ def test_the_past_is_drawn_and_read_with_arrow_keys(page: Page) -> None:
     assert kept
     page.get_by_label("Last").select_option("60")
     assert "minutes=60" in page.url
+
+
+@pytest.mark.parametrize("hours", [1, -1])
+def test_the_past_ends_now_by_the_clock_of_the_station(page: Page, hours: int) -> None:
+    a, b = partners(page)
+    page.add_init_script(f"const now = Date.now; Date.now = () => now() + {hours} * 3600000;")
+    with page.expect_request("**/history*") as asking:
+        page.goto(f"/dashboard/pairs/{a}/{b}?minutes=2")
+    (since,) = parse_qs(urlsplit(asking.value.url).query)["from"]
+    spent_s = (datetime.now(UTC) - datetime.fromisoformat(since)).total_seconds()
+    assert spent_s == pytest.approx(120, abs=30)
+    expect(page.locator(".cv-line-chart .cv-line-a")).to_have_attribute("d", re.compile(r"^M[\d.]+ [\d.]+H"))
 
 
 def test_a_past_that_cannot_be_read_says_so_and_the_rest_stands(page: Page, browser: Browser, station: Any) -> None:

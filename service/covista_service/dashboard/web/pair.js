@@ -25,7 +25,7 @@ export default {
       if (odd !== undefined) return `No robot can be called ${odd}: names are of small letters, digits, - and _.`;
       return props.a === props.b ? `${props.a} makes no pair with itself. Choose another robot.` : "";
     });
-    const { facts, problem } = usePairFacts(pair);
+    const { facts, problem, aheadMs } = usePairFacts(pair);
 
     const names = shallowRef([]);
     pulse(tagged(rest("/groups"), ({ groups, ungrouped }) => {
@@ -66,7 +66,7 @@ export default {
       const why = facts.value?.why_not;
       return why ? `None. ${why}` : "None in these keyframes: nothing was matched in both images yet. The overlap is predicted.";
     });
-    return { facts, problem, wrong, before, after, go, options, wanted, look, moment, none, sides, page, ago };
+    return { facts, problem, aheadMs, wrong, before, after, go, options, wanted, look, moment, none, sides, page, ago };
   },
   template: `
     <div class="cv-pair">
@@ -114,7 +114,7 @@ export default {
             <p v-if="look?.pair.planes.length" class="cv-soft">In the world: normal · X + offset = 0. Points are the matched ones that lie on it.</p>
           </section>
         </div>
-        <pair-history :a="a" :b="b"></pair-history>
+        <pair-history :a="a" :b="b" :ahead-ms="aheadMs"></pair-history>
       </template>
     </div>`,
 };
