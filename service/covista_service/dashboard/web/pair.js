@@ -1,17 +1,38 @@
 // Two robots: both keyframes with the common field, what is known of it, the planes behind it, and how it was before.
-import { computed, ref, shallowRef } from "vue";
-import { page, rest, tagged } from "covista/ask.js";
-import { ago, byName } from "covista/looks.js";
+import { computed, ref } from "vue";
+import { page } from "covista/ask.js";
+import { ago } from "covista/looks.js";
 import { isId, usePairFacts } from "covista/pair_facts.js";
 import { usePairLook } from "covista/pair_look.js";
-import { pulse } from "covista/pulse.js";
+import { usePartners } from "covista/pair_partners.js";
 import GroupMark from "covista/group_mark.js";
 import PairBrief from "covista/pair_brief.js";
 import PairHistory from "covista/pair_history.js";
 import PairPicture from "covista/pair_picture.js";
 import PlanesTable from "covista/planes_table.js";
 
-const NAMES_MS = 3000;
+// What is wrong with the address itself.
+function wrongIn(a, b) {
+  const odd = [a, b].find((name) => !isId(name));
+  if (odd !== undefined) return `No robot can be called ${odd}: names are of small letters, digits, - and _.`;
+  return a === b ? `${a} makes no pair with itself. Choose another robot.` : "";
+}
+
+// Which moment the pictures are of.
+function momentOf(look, sinceS, wanted) {
+  if (!look || sinceS === null) return "";
+  if (wanted === "held") return "Held: what has come since is not in the pictures.";
+  if (!look.explained) return "Of the newest keyframes, without planes.";
+  return sinceS < 2 ? "Of the newest keyframes, with planes." : `Of ${ago(sinceS)} ago: newer keyframes have no planes yet.`;
+}
+
+// Why there are no planes.
+function whyNone(look, facts) {
+  if (!look) return "Asking the station.";
+  if (!look.pair.keyframes) return "None: what both see is not known yet.";
+  const why = facts?.why_not;
+  return why ? `None. ${why}` : "None in these keyframes: nothing was matched in both images yet. The overlap is predicted.";
+}
 
 export default {
   components: { GroupMark, PairBrief, PairHistory, PairPicture, PlanesTable },
@@ -19,39 +40,12 @@ export default {
   setup(props) {
     document.title = `${props.a} and ${props.b} - Covista`;
     const pair = computed(() => [props.a, props.b]);
-    // What is wrong with the address itself.
-    const wrong = computed(() => {
-      const odd = pair.value.find((name) => !isId(name));
-      if (odd !== undefined) return `No robot can be called ${odd}: names are of small letters, digits, - and _.`;
-      return props.a === props.b ? `${props.a} makes no pair with itself. Choose another robot.` : "";
-    });
+    const wrong = computed(() => wrongIn(props.a, props.b));
     const { facts, problem, aheadMs } = usePairFacts(pair);
-
-    const names = shallowRef([]);
-    pulse(tagged(rest("/groups"), ({ groups, ungrouped }) => {
-      names.value = [...groups.flatMap((group) => group.robots), ...ungrouped.map((each) => each.robot)].sort(byName);
-    }), NAMES_MS);
-    // Who comes before and after b, beside a.
-    const beside = (step) => {
-      const others = names.value.filter((name) => name !== props.a);
-      if (others.length < 2) return null;
-      const at = others.indexOf(props.b);
-      if (at < 0) return others.at(step < 0 ? -1 : 0);
-      return others[(at + step + others.length) % others.length];
-    };
-    const before = computed(() => beside(-1));
-    const after = computed(() => beside(1));
-    const go = (a, b) => location.assign(page(`/pairs/${a}/${b}`));
-    const options = (mine) => (names.value.includes(mine) ? names.value : [mine, ...names.value]);
-
     const wanted = ref("told");
     const { look, sinceS } = usePairLook(pair, wanted, computed(() => facts.value !== null));
-    const moment = computed(() => {
-      if (!look.value || sinceS.value === null) return "";
-      if (wanted.value === "held") return "Held: what has come since is not in the pictures.";
-      if (!look.value.explained) return "Of the newest keyframes, without planes.";
-      return sinceS.value < 2 ? "Of the newest keyframes, with planes." : `Of ${ago(sinceS.value)} ago: newer keyframes have no planes yet.`;
-    });
+    const moment = computed(() => momentOf(look.value, sinceS.value, wanted.value));
+    const none = computed(() => whyNone(look.value, facts.value));
     const sides = computed(() =>
       ["a", "b"].map((side, k) => {
         const [name, other] = k ? [props.b, props.a] : [props.a, props.b];
@@ -59,14 +53,7 @@ export default {
         return { side, name, other, keyframe, robot: facts.value?.robots[k], picture: look.value?.pictures[k] };
       }),
     );
-    // Why there are no planes.
-    const none = computed(() => {
-      if (!look.value) return "Asking the station.";
-      if (!look.value.pair.keyframes) return "None: what both see is not known yet.";
-      const why = facts.value?.why_not;
-      return why ? `None. ${why}` : "None in these keyframes: nothing was matched in both images yet. The overlap is predicted.";
-    });
-    return { facts, problem, aheadMs, wrong, before, after, go, options, wanted, look, moment, none, sides, page, ago };
+    return { ...usePartners(props.a, props.b), facts, problem, aheadMs, wrong, wanted, look, moment, none, sides, page, ago };
   },
   template: `
     <div class="cv-pair">
