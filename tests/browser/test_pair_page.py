@@ -66,6 +66,25 @@ def test_planes_are_listed_with_points_where_pictures_show_them(page: Page) -> N
     expect(rows).to_have_count(0)
 
 
+def test_what_pictures_say_of_before_is_told_apart_from_what_is_known_now(page: Page) -> None:
+    a, b = partners(page)
+    look = page.request.get(f"/dashboard/data/pair/look?a={a}&b={b}").json()
+    facts = page.request.get(f"/dashboard/data/pair?a={a}&b={b}").json()
+    now = {"overlap_a": 0.881, "overlap_b": 0.7, "found_by": "predicted", "inliers": 116, "outcome": "measured"}
+    now |= {"why_not": None, "matched": "When their images were last compared, 116 matched points agreed."}
+    look["pair"] |= {"overlap_a": 0.932, "overlap_b": 0.7, "found_by": "image"}
+    page.route("**/data/pair/look*", lambda route: route.fulfill(json=look))
+    page.route("**/data/pair?*", lambda route: route.fulfill(json=facts | now))
+    opened(page, a, b)
+    known = page.locator("section", has=page.locator(FACTS))
+    expect(known).to_contain_text("are of keyframes from before; these are of where the robots stand now")
+    expect(known).to_contain_text("When their images were last compared, 116 matched points agreed.")
+    # As near as one can read.
+    now |= {"overlap_a": 0.929, "found_by": "image", "matched": "116 matched points agree."}
+    expect(known).not_to_contain_text("from before")
+    expect(known).to_contain_text(re.compile(f"93 %.*{a}'s view"))
+
+
 def test_pictures_are_not_sent_again_while_they_are_the_same(page: Page) -> None:
     a, b = partners(page)
     opened(page, a, b)
