@@ -1,7 +1,9 @@
 from __future__ import annotations
 
 import re
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qs, urlsplit
 
 import pytest
 
@@ -64,6 +66,25 @@ def test_planes_are_listed_with_points_where_pictures_show_them(page: Page) -> N
     expect(rows).to_have_count(0)
 
 
+def test_what_pictures_say_of_before_is_told_apart_from_what_is_known_now(page: Page) -> None:
+    a, b = partners(page)
+    look = page.request.get(f"/dashboard/data/pair/look?a={a}&b={b}").json()
+    facts = page.request.get(f"/dashboard/data/pair?a={a}&b={b}").json()
+    now = {"overlap_a": 0.881, "overlap_b": 0.7, "found_by": "predicted", "inliers": 116, "outcome": "measured"}
+    now |= {"why_not": None, "matched": "When their images were last compared, 116 matched points agreed."}
+    look["pair"] |= {"overlap_a": 0.932, "overlap_b": 0.7, "found_by": "image"}
+    page.route("**/data/pair/look*", lambda route: route.fulfill(json=look))
+    page.route("**/data/pair?*", lambda route: route.fulfill(json=facts | now))
+    opened(page, a, b)
+    known = page.locator("section", has=page.locator(FACTS))
+    expect(known).to_contain_text("are of keyframes from before; these are of where the robots stand now")
+    expect(known).to_contain_text("When their images were last compared, 116 matched points agreed.")
+    # As near as one can read.
+    now |= {"overlap_a": 0.929, "found_by": "image", "matched": "116 matched points agree."}
+    expect(known).not_to_contain_text("from before")
+    expect(known).to_contain_text(re.compile(f"93 %.*{a}'s view"))
+
+
 def test_pictures_are_not_sent_again_while_they_are_the_same(page: Page) -> None:
     a, b = partners(page)
     opened(page, a, b)
@@ -117,6 +138,18 @@ def test_the_past_is_drawn_and_read_with_arrow_keys(page: Page) -> None:
     assert kept
     page.get_by_label("Last").select_option("60")
     assert "minutes=60" in page.url
+
+
+@pytest.mark.parametrize("hours", [1, -1])
+def test_the_past_ends_now_by_the_clock_of_the_station(page: Page, hours: int) -> None:
+    a, b = partners(page)
+    page.add_init_script(f"const now = Date.now; Date.now = () => now() + {hours} * 3600000;")
+    with page.expect_request("**/history*") as asking:
+        page.goto(f"/dashboard/pairs/{a}/{b}?minutes=2")
+    (since,) = parse_qs(urlsplit(asking.value.url).query)["from"]
+    spent_s = (datetime.now(UTC) - datetime.fromisoformat(since)).total_seconds()
+    assert spent_s == pytest.approx(120, abs=30)
+    expect(page.locator(".cv-line-chart .cv-line-a")).to_have_attribute("d", re.compile(r"^M[\d.]+ [\d.]+H"))
 
 
 def test_a_past_that_cannot_be_read_says_so_and_the_rest_stands(page: Page, browser: Browser, station: Any) -> None:

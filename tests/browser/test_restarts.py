@@ -60,6 +60,22 @@ def test_pages_outlive_a_station_that_was_killed_and_say_so(guest: Visitor, own:
     notice(swarm).wait_for(state="detached")
 
 
+def test_what_was_applied_is_undone_after_a_restart(guest: Visitor, own: BrowsedStation) -> None:
+    guest.allow(*AWAY, r"WebSocket connection to .* failed")
+    page = guest.page()
+    opened(page, "/dashboard/what-if?alpha=0.7", "What if")
+    page.get_by_role("button", name="Apply ...").click()
+    page.get_by_role("dialog").get_by_role("button", name="Apply", exact=True).click()
+    page.get_by_text(re.compile("^Applied at")).wait_for()
+    own.stop()
+    own.start()
+    done = page.get_by_text(re.compile("^Applied at .*, before the station restarted: alpha is 0.7, was 0.5"))
+    done.get_by_role("button", name="Undo").click(timeout=30_000)
+    page.get_by_text(re.compile("^Undone at .*: alpha is 0.5, was 0.7")).wait_for()
+    with own.client() as client:
+        assert client.get("/api/v1/settings").json()["alpha"] == 0.5
+
+
 def test_a_station_that_hangs_is_said_to_be_away_and_then_to_be_there(guest: Visitor, own: BrowsedStation) -> None:
     guest.allow(*FROZEN)
     page = guest.page()

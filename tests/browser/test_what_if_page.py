@@ -78,6 +78,7 @@ def confirm(page: Page, action: str) -> None:
 
 def test_nothing_changes_until_it_is_applied_and_undo_brings_it_back(page: Page, station: Place) -> None:
     tried(page)
+    said(page, "^Move a slider or choose another value: .* Nothing changes until you press Apply")
     before = members(page, "now")
     assert len(before) == 2
     setting(page, "groups").get_by_role("combobox").select_option("number")
@@ -200,6 +201,58 @@ def test_what_others_change_meanwhile_is_told_and_undo_asks(page: Page, station:
     confirm(page, "Undo all the same")
     said(page, "^Undone")
     assert settings(page, station) == AS_THEY_ARE | {"criterion": "gain"}
+
+
+def applied(page: Page, query: str, *, done: str = "^Applied") -> Page:
+    tried(page, query)
+    page.get_by_role("button", name="Apply ...").click()
+    confirm(page, "Apply")
+    said(page, done)
+    return page
+
+
+def test_undo_outlives_the_page(page: Page, station: Place) -> None:
+    applied(page, "?alpha=0.7&hysteresis.gain=0.1")
+    applied(page, "?groups=3&alpha=0.9", done="^Applied at .*: alpha is 0.9, was 0.7; groups is 3, was auto")
+    page.reload()
+    said(page, r"^Applied at [\d:]+: alpha is 0\.9, was 0\.7; groups is 3, was auto")
+    page.get_by_role("button", name="Undo").click()
+    said(page, "^Undone at .*: alpha is 0.7, was 0.9; groups is auto, was 3")
+    page.reload()
+    page.get_by_role("button", name="Undo").click()
+    said(page, "^Undone at .*: alpha is 0.5, was 0.7; hysteresis.gain is 0.05, was 0.1")
+    assert settings(page, station) == AS_THEY_ARE
+    tried(page)
+    assert page.get_by_role("button", name="Undo").count() == 0
+    assert page.get_by_text("Applied at").count() == 0
+
+
+def test_what_others_have_changed_while_the_page_was_away_is_not_undone(page: Page, station: Place) -> None:
+    applied(page, "?alpha=0.7&groups=3")
+    page.goto("/dashboard/health")
+    changed(page, station, alpha=0.9)
+    tried(page)
+    said(page, "cannot be undone here any more, for it was changed elsewhere since: alpha is 0.9, was 0.7")
+    assert page.get_by_role("button", name="Undo").count() == 0
+    assert settings(page, station) == AS_THEY_ARE | {"alpha": 0.9, "groups": 3}
+    page.reload()
+    page.get_by_role("heading", name="Groups", exact=True).wait_for()
+    assert page.get_by_text("cannot be undone").count() == 0
+
+
+def test_of_what_was_applied_only_what_still_stands_is_undone(page: Page, station: Place) -> None:
+    applied(page, "?alpha=0.7")
+    changed(page, station, alpha=0.9)
+    said(page, "Somebody else has changed settings")
+    setting(page, "criterion").get_by_role("combobox").select_option("gain")
+    page.get_by_role("button", name="Apply ...").click()
+    confirm(page, "Apply")
+    said(page, "^Applied at .*: criterion is gain, was adaptive")
+    page.reload()
+    page.get_by_role("button", name="Undo").click()
+    said(page, "^Undone at .*: criterion is adaptive, was gain")
+    assert page.get_by_role("button", name="Undo").count() == 0
+    assert settings(page, station) == AS_THEY_ARE | {"alpha": 0.9}
 
 
 def test_bounds_that_contradict_each_other_are_told_beside_the_form(page: Page, station: Place, visitor: Any) -> None:

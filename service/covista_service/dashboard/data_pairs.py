@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from covista_schemas.keys import ID_PATTERN
+from covista_schemas.reports import time_of
 from fastapi import APIRouter, Query, Response
 from pydantic_core import to_json
 
@@ -21,15 +22,16 @@ router = APIRouter(prefix="/pair")
 
 @router.get("")
 async def facts(sources: SourcesNow, a: RobotQuery, b: RobotQuery) -> Response:
-    """What is known of two robots, as often as a mouse moves; a `problem` where they are no pair.
+    """What is known of two robots at which `time`, as often as a mouse moves; a `problem` where they are no pair.
 
     That is no error, of which browsers would complain each second that somebody looks at a robot that is not there.
     """
+    snapshot = sources.loop.snapshot()
     try:
-        told = pair_facts(sources.loop.snapshot(), a, b)
+        told = pair_facts(snapshot, a, b)
     except NotKnownError as error:
         told = {"a": a, "b": b, "problem": error.detail}
-    return Response(to_json(told), media_type=_JSON)
+    return Response(to_json({"time": time_of(snapshot.wall_ns).isoformat(), **told}), media_type=_JSON)
 
 
 @router.get("/look")

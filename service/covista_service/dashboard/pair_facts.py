@@ -41,6 +41,7 @@ def pair_facts(snapshot: Snapshot, a: str, b: str) -> dict[str, Any]:
         **pair.model_dump(mode="json"),
         **_likeness(snapshot, a, b),
         "how": how,
+        "matched": "" if how == _APART else _matched(pair),
         "why_not": None if how == _APART else _OUTCOMES.get(pair.outcome),
         "warnings": [*_presence(snapshot, robots), *_poses(pair, robots)],
         "robots": [_robot(snapshot, robot, view) for robot in robots],
@@ -65,6 +66,15 @@ def _likeness(snapshot: Snapshot, a: str, b: str) -> dict[str, float | None]:
 
 def _how(view: PairView) -> str:
     return _APART if view.apart else _HOW[view.found_by]
+
+
+def _matched(pair: PairSummary) -> str:
+    """What the images had to say, of now or of when they were last compared: what is predicted is of other poses."""
+    if not pair.inliers:
+        return ""
+    if pair.found_by is FoundBy.IMAGE:
+        return f"{pair.inliers} matched points agree."
+    return f"When their images were last compared, {pair.inliers} matched points agreed."
 
 
 def _presence(snapshot: Snapshot, robots: tuple[RobotView, RobotView]) -> Iterator[str]:

@@ -1,9 +1,11 @@
 import asyncio
+from datetime import datetime
 from types import SimpleNamespace
 from typing import Any
 
 import httpx
 import pytest
+from covista_schemas.reports import time_of
 from covista_service.dashboard.data_pairs import router
 from covista_service.dashboard.looks import Looks
 from covista_service.dashboard.sources import sources_of
@@ -38,8 +40,16 @@ def ask(app: FastAPI, path: str) -> Any:
 
 
 def test_who_makes_no_pair_is_an_answer_and_no_error(app: FastAPI) -> None:
-    assert ask(app, "/pair?a=r1&b=r9") == {"a": "r1", "b": "r9", "problem": "no robot 'r9' is known"}
+    told = ask(app, "/pair?a=r1&b=r9")
+    assert (told["a"], told["b"], told["problem"]) == ("r1", "r9", "no robot 'r9' is known")
     assert "with itself" in ask(app, "/pair?a=r1&b=r1")["problem"]
+
+
+def test_the_time_is_that_of_the_station_for_who_makes_no_pair_too(app: FastAPI) -> None:
+    sources = app.dependency_overrides[sources_of]()
+    now = time_of(sources.loop.snapshot().wall_ns)
+    for other in ("r2", "r9"):
+        assert datetime.fromisoformat(ask(app, f"/pair?a=r1&b={other}")["time"]) == now
 
 
 def test_what_is_no_name_is_refused(app: FastAPI) -> None:

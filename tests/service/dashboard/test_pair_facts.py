@@ -58,6 +58,16 @@ def test_how_a_pair_was_found_is_a_sentence(snapshot: Snapshot) -> None:
     assert facts["warnings"] == []
 
 
+def test_matched_points_are_of_the_last_comparison_where_the_overlap_is_predicted(snapshot: Snapshot) -> None:
+    assert pair_facts(snapshot, "r1", "r2")["matched"] == "9 matched points agree."
+    scene = two_that_share()
+    scene.send_pose("r2", pose(0.6))
+    scene.settle()
+    facts = pair_facts(scene.snapshot, "r1", "r2")
+    assert facts["found_by"] == "predicted"
+    assert facts["matched"] == "When their images were last compared, 9 matched points agreed."
+
+
 def test_images_that_do_not_match_say_so() -> None:
     def nothing(job: SurveyPair) -> Found:
         return NOTHING
@@ -75,6 +85,7 @@ def test_views_that_cannot_meet_are_told_apart_from_views_that_are_not_known() -
     facts = pair_facts(scene.snapshot, "a0", "b7")
     assert (facts["overlap_a"], facts["overlap_b"]) == (0, 0)
     assert facts["how"] == "Their views cannot meet, so they have nothing in common."
+    assert facts["matched"] == ""
 
 
 def test_a_robot_without_a_pose_has_no_distance() -> None:

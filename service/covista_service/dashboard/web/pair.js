@@ -1,17 +1,47 @@
 // Two robots: both keyframes with the common field, what is known of it, the planes behind it, and how it was before.
-import { computed, ref, shallowRef } from "vue";
-import { page, rest, tagged } from "covista/ask.js";
-import { ago, byName } from "covista/looks.js";
+import { computed, ref } from "vue";
+import { page } from "covista/ask.js";
+import { ago, percent } from "covista/looks.js";
 import { isId, usePairFacts } from "covista/pair_facts.js";
 import { usePairLook } from "covista/pair_look.js";
-import { pulse } from "covista/pulse.js";
+import { usePartners } from "covista/pair_partners.js";
 import GroupMark from "covista/group_mark.js";
 import PairBrief from "covista/pair_brief.js";
 import PairHistory from "covista/pair_history.js";
 import PairPicture from "covista/pair_picture.js";
 import PlanesTable from "covista/planes_table.js";
 
-const NAMES_MS = 3000;
+// What is wrong with the address itself.
+function wrongIn(a, b) {
+  const odd = [a, b].find((name) => !isId(name));
+  if (odd !== undefined) return `No robot can be called ${odd}: names are of small letters, digits, - and _.`;
+  return a === b ? `${a} makes no pair with itself. Choose another robot.` : "";
+}
+
+// Which moment the pictures are of.
+function momentOf(look, sinceS, wanted) {
+  if (!look || sinceS === null) return "";
+  if (wanted === "held") return "Held: what has come since is not in the pictures.";
+  if (!look.explained) return "Of the newest keyframes, without planes.";
+  return sinceS < 2 ? "Of the newest keyframes, with planes." : `Of ${ago(sinceS)} ago: newer keyframes have no planes yet.`;
+}
+
+// Why there are no planes.
+function whyNone(look, facts) {
+  if (!look) return "Asking the station.";
+  if (!look.pair.keyframes) return "None: what both see is not known yet.";
+  const why = facts?.why_not;
+  if (why) return `None. ${why}`;
+  if (facts?.inliers) return "None in these keyframes: they are newer than the images that were last compared.";
+  return "None in these keyframes: nothing was matched in both images yet. The overlap is predicted.";
+}
+
+// Whether what is written in the pictures, which are of keyframes, is other than what is known of where robots stand now.
+function areOfBefore(look, facts) {
+  if (!facts || !look?.pictures.some(({ png }) => png)) return false;
+  const said = ({ overlap_a, overlap_b, found_by }) => `${percent(overlap_a)}, ${percent(overlap_b)}, ${found_by}`;
+  return said(look.pair) !== said(facts);
+}
 
 export default {
   components: { GroupMark, PairBrief, PairHistory, PairPicture, PlanesTable },
@@ -19,39 +49,13 @@ export default {
   setup(props) {
     document.title = `${props.a} and ${props.b} - Covista`;
     const pair = computed(() => [props.a, props.b]);
-    // What is wrong with the address itself.
-    const wrong = computed(() => {
-      const odd = pair.value.find((name) => !isId(name));
-      if (odd !== undefined) return `No robot can be called ${odd}: names are of small letters, digits, - and _.`;
-      return props.a === props.b ? `${props.a} makes no pair with itself. Choose another robot.` : "";
-    });
-    const { facts, problem } = usePairFacts(pair);
-
-    const names = shallowRef([]);
-    pulse(tagged(rest("/groups"), ({ groups, ungrouped }) => {
-      names.value = [...groups.flatMap((group) => group.robots), ...ungrouped.map((each) => each.robot)].sort(byName);
-    }), NAMES_MS);
-    // Who comes before and after b, beside a.
-    const beside = (step) => {
-      const others = names.value.filter((name) => name !== props.a);
-      if (others.length < 2) return null;
-      const at = others.indexOf(props.b);
-      if (at < 0) return others.at(step < 0 ? -1 : 0);
-      return others[(at + step + others.length) % others.length];
-    };
-    const before = computed(() => beside(-1));
-    const after = computed(() => beside(1));
-    const go = (a, b) => location.assign(page(`/pairs/${a}/${b}`));
-    const options = (mine) => (names.value.includes(mine) ? names.value : [mine, ...names.value]);
-
+    const wrong = computed(() => wrongIn(props.a, props.b));
+    const { facts, problem, aheadMs } = usePairFacts(pair);
     const wanted = ref("told");
     const { look, sinceS } = usePairLook(pair, wanted, computed(() => facts.value !== null));
-    const moment = computed(() => {
-      if (!look.value || sinceS.value === null) return "";
-      if (wanted.value === "held") return "Held: what has come since is not in the pictures.";
-      if (!look.value.explained) return "Of the newest keyframes, without planes.";
-      return sinceS.value < 2 ? "Of the newest keyframes, with planes." : `Of ${ago(sinceS.value)} ago: newer keyframes have no planes yet.`;
-    });
+    const moment = computed(() => momentOf(look.value, sinceS.value, wanted.value));
+    const none = computed(() => whyNone(look.value, facts.value));
+    const ofBefore = computed(() => areOfBefore(look.value, facts.value));
     const sides = computed(() =>
       ["a", "b"].map((side, k) => {
         const [name, other] = k ? [props.b, props.a] : [props.a, props.b];
@@ -59,14 +63,7 @@ export default {
         return { side, name, other, keyframe, robot: facts.value?.robots[k], picture: look.value?.pictures[k] };
       }),
     );
-    // Why there are no planes.
-    const none = computed(() => {
-      if (!look.value) return "Asking the station.";
-      if (!look.value.pair.keyframes) return "None: what both see is not known yet.";
-      const why = facts.value?.why_not;
-      return why ? `None. ${why}` : "None in these keyframes: nothing was matched in both images yet. The overlap is predicted.";
-    });
-    return { facts, problem, wrong, before, after, go, options, wanted, look, moment, none, sides, page, ago };
+    return { ...usePartners(props.a, props.b), facts, problem, aheadMs, wrong, wanted, look, moment, none, ofBefore, sides, page, ago };
   },
   template: `
     <div class="cv-pair">
@@ -104,6 +101,7 @@ export default {
         <div class="cv-known" v-if="!problem">
           <section class="cv-card" aria-labelledby="cv-facts">
             <h2 id="cv-facts">What is known</h2>
+            <p v-if="ofBefore" class="cv-note">The pictures, and the shares written in them, are of keyframes from before; these are of where the robots stand now.</p>
             <pair-brief v-if="facts" :facts="facts"></pair-brief>
             <p v-else class="cv-brief">Asking the station.</p>
           </section>
@@ -114,7 +112,7 @@ export default {
             <p v-if="look?.pair.planes.length" class="cv-soft">In the world: normal · X + offset = 0. Points are the matched ones that lie on it.</p>
           </section>
         </div>
-        <pair-history :a="a" :b="b"></pair-history>
+        <pair-history :a="a" :b="b" :ahead-ms="aheadMs"></pair-history>
       </template>
     </div>`,
 };

@@ -1,157 +1,23 @@
 // What other settings would make of the swarm, beside what is; nothing changes until somebody applies it.
-import { computed, nextTick, ref, shallowRef, watch } from "vue";
-import { asked, data, Lost, rest } from "covista/ask.js";
-import { newest } from "covista/newest.js";
+import { useApplied } from "covista/applied.js";
+import { useApplying } from "covista/applying.js";
+import { usePreview } from "covista/preview.js";
 import { useProposal } from "covista/proposal.js";
-import { pulse } from "covista/pulse.js";
-import { patchOf, same, says } from "covista/settings_words.js";
+import { says } from "covista/settings_words.js";
+import { named, useVerdict } from "covista/verdict.js";
 import ConfirmBox from "covista/confirm_box.js";
 import ScoreLines from "covista/score_lines.js";
 import SettingField from "covista/setting_field.js";
-import WouldBe, { movers } from "covista/would_be.js";
-
-const EVERY_MS = 3000;
-const QUIET_MS = 200;
-const MOST_NAMED = 8;
-
-const named = (robots) => {
-  const first = robots.slice(0, MOST_NAMED).join(", ");
-  return robots.length > MOST_NAMED ? `${first} and ${robots.length - MOST_NAMED} more` : first;
-};
-const number = (count) => `${count} ${count === 1 ? "group" : "groups"}`;
+import WouldBe from "covista/would_be.js";
 
 export default {
   components: { ConfirmBox, ScoreLines, SettingField, WouldBe },
   setup() {
-    const sections = shallowRef([]);
     const proposal = useProposal();
-    const { live, changes } = proposal;
-    const [now, then, asIs] = [shallowRef(null), shallowRef(null), shallowRef(null)];
-    const operates = ref(null);
-    const [trouble, applyTrouble] = [ref(""), ref("")];
-    // Answers that were asked for before settings were given here are of the past.
-    let given = 0;
-
-    const bodyOf = () => JSON.stringify(patchOf(changes.value));
-    const preview = (body) => asked(rest("/groups/preview"), { method: "POST", body });
-    const look = async () => {
-      const [turn, body] = [given, bodyOf()];
-      try {
-        if (!sections.value.length) {
-          sections.value = (await asked(data("/choices"))).sections;
-          proposal.read(sections.value.flatMap(({ settings }) => settings));
-        }
-        const [groups, session] = await Promise.all([asked(rest("/groups")), asked(data("/session"))]);
-        if (turn !== given) return;
-        operates.value = session.operates;
-        now.value = groups;
-        proposal.take(groups.settings);
-        if (body !== bodyOf()) return again();
-        const found = changes.value.length ? await Promise.all([preview(JSON.parse(body)), preview({})]) : [null, null];
-        if (turn !== given || body !== bodyOf()) return again();
-        [then.value, asIs.value] = found;
-        trouble.value = "";
-      } catch (error) {
-        if (error instanceof Lost) throw error;
-        if (body !== bodyOf()) return again();
-        then.value = null;
-        trouble.value = error.status === 409 ? `These settings contradict each other: ${error.message}.` : `No preview now: ${error.message}.`;
-      }
-    };
-    const looking = newest(look, QUIET_MS);
-    const again = () => looking.soon();
-    pulse(looking.now, EVERY_MS);
-    watch(changes, (next, before) => {
-      if (JSON.stringify(patchOf(next)) !== JSON.stringify(patchOf(before))) looking.soon();
-    });
-
-    const moved = computed(() => (now.value && then.value ? movers(now.value, then.value) : []));
-    const summary = computed(() => {
-      if (!now.value || !changes.value.length) return "";
-      if (!then.value) return trouble.value ? "" : "Asking the station.";
-      const [before, after] = [now.value.groups.length, then.value.groups.length];
-      const much = before === after ? `Still ${number(after)}` : `${number(after)} instead of ${before}`;
-      if (!moved.value.length) return `${much}: nobody would move.`;
-      const names = moved.value.map(({ robot }) => robot);
-      return names.length > MOST_NAMED ? `${much}: ${names.length} robots would move.` : `${much}: ${named(names)} would move.`;
-    });
-    // Who would move as settings are, if nothing held on to the groups on show.
-    const anyway = computed(() => {
-      if (!asIs.value || !then.value) return [];
-      const alike = new Map(movers(now.value, asIs.value).map(({ robot, to }) => [robot, to]));
-      return moved.value.filter(({ robot, to }) => alike.get(robot) === to).map(({ robot }) => robot);
-    });
-    const unseen = computed(() => changes.value.filter(({ choice, value, was }) =>
-      !choice.shown && !(choice.name === "hysteresis.smoothing" && (value === 1 || was === 1))).map(({ name }) => name));
-    const robots = computed(() => (now.value ? now.value.groups.reduce((sum, group) => sum + group.robots.length, 0) : 0));
-
-    const [applying, undoing, busy] = [ref(false), ref(false), ref(false)];
-    // Newest last: what was applied here, and can be taken back.
-    const done = ref([]);
-    const word = ref("");
-    const told = ref(null);
-    const send = async (asking, after) => {
-      busy.value = true;
-      applyTrouble.value = "";
-      let went = false;
-      try {
-        const settings = await asked(rest("/settings"), { method: "PATCH", body: patchOf(asking) });
-        given += 1;
-        proposal.given(settings, asking);
-        after();
-        went = true;
-      } catch (error) {
-        if (error.status === 403) operates.value = false;
-        applyTrouble.value = `Nothing was changed: ${error.message}.`;
-        if (error instanceof Lost) applyTrouble.value = "No answer came: look below whether the settings are in force.";
-      } finally {
-        [busy.value, applying.value, undoing.value] = [false, false, false];
-        looking.soon();
-        // What was pressed is gone, or cannot be pressed again.
-        await nextTick();
-        if (went) told.value?.focus();
-      }
-    };
-    const clock = () => new Date().toLocaleTimeString();
-    const apply = () => {
-      const asking = changes.value.map(({ name, value, was }) => ({ name, value, was }));
-      return send(asking, () => {
-        done.value.push(asking);
-        word.value = `Applied at ${clock()}: ${asking.map(says).join("; ")}.`;
-        proposal.reset();
-      });
-    };
-    const last = computed(() => done.value.at(-1) ?? []);
-    // What others have made of it meanwhile.
-    const overtaken = computed(() => last.value.filter(({ name, value }) => !same(live.value[name], value)));
-    const back = computed(() => last.value
-      .map(({ name, was }) => ({ name, value: was, was: live.value[name] }))
-      .filter(({ value, was }) => !same(value, was)));
-    const undo = () => {
-      const asking = back.value;
-      return send(asking, () => {
-        done.value.pop();
-        word.value = asking.length ? `Undone at ${clock()}: ${asking.map(says).join("; ")}.` : "Somebody else has undone it already.";
-      });
-    };
-    const askUndo = async () => {
-      if (busy.value) return;
-      busy.value = true;
-      // Others may have changed them since the last look.
-      try {
-        proposal.take(await asked(rest("/settings")));
-      } catch (error) {
-        applyTrouble.value = `Nothing was changed: ${error.message}.`;
-        return;
-      } finally {
-        busy.value = false;
-      }
-      if (overtaken.value.length) undoing.value = true;
-      else await undo();
-    };
+    const applied = useApplied();
+    const preview = usePreview(proposal, applied.recall);
     return {
-      ...proposal, sections, now, then, asIs, operates, trouble, applyTrouble, summary, anyway, unseen, robots, named, says, same,
-      applying, undoing, busy, done, word, told, apply, undo, askUndo, overtaken, back,
+      ...proposal, ...preview, ...applied, ...useVerdict(preview, proposal.changes), ...useApplying(proposal, preview, applied), named, says,
     };
   },
   template: `
@@ -174,7 +40,7 @@ export default {
             <button v-if="done.length" type="button" :disabled="busy || !operates" @click="askUndo">Undo</button></p>
           <p v-if="applyTrouble" class="cv-problem" role="alert">{{ applyTrouble }}</p>
           <p v-if="trouble" class="cv-problem" role="alert">{{ trouble }}</p>
-          <p v-if="!changes.length">Try other settings: the groups that would be appear here. Nothing changes until you apply it.</p>
+          <p v-if="!changes.length">Move a slider or choose another value: the groups that would be are shown here, beside those that are. Nothing changes until you press Apply.</p>
           <template v-else>
             <p class="cv-summary" aria-live="polite">{{ summary }}</p>
             <p v-if="then?.note" class="cv-note">{{ then.note }}</p>
@@ -203,10 +69,10 @@ export default {
       <confirm-box :open="applying" title="Apply these settings?" action="Apply" :busy="busy" @confirm="apply" @close="applying = false">
         <ul><li v-for="change in changes" :key="change.name">{{ says(change) }}</li></ul>
         <p v-if="summary">{{ summary }}</p>
-        <p>They hold at once for everybody, and after a restart too. You can undo it here as long as this page is open.</p>
+        <p>They hold at once for everybody, and after a restart too. You can undo this here until you close the tab, or somebody else changes them.</p>
       </confirm-box>
       <confirm-box :open="undoing" title="Somebody else has changed them since" action="Undo all the same" :busy="busy" @confirm="undo" @close="undoing = false">
-        <p>Since you applied yours: {{ overtaken.map(({ name, value }) => says({ name, value: live[name], was: value })).join("; ") }}. To undo now means:</p>
+        <p>Since you applied yours: {{ overtaken.map(says).join("; ") }}. To undo now means:</p>
         <ul><li v-for="change in back" :key="change.name">{{ says(change) }}</li></ul>
       </confirm-box>
     </div>`,

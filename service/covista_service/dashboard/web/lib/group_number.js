@@ -1,7 +1,8 @@
 // Why this number of groups: the criterion in words, the score of every number, and what stands in the way.
 import { computed } from "vue";
 import { criterionSentence, scoreSentence } from "covista/criteria.js";
-import ScoreChart, { bestOf } from "covista/score_chart.js";
+import { bestOf } from "covista/score_best.js";
+import ScoreChart from "covista/score_chart.js";
 
 const FEW_NAMES = 12;
 const listed = (names) =>
@@ -11,7 +12,7 @@ const groupsOf = (count) => `${count} ${count === 1 ? "group" : "groups"}`;
 // What holds of the number that is shown, in sentences.
 export function reasonsOf(groups) {
   const { scores, settings, waiting } = groups;
-  const [shown, best] = [groups.groups.length, bestOf(scores)];
+  const [shown, best] = [groups.groups.length, bestOf(scores)?.groups ?? null];
   const sentences = [];
   const asked = settings.groups;
   if (typeof asked === "number") sentences.push(`The settings ask for ${groupsOf(asked)}; no other number is looked at.`);

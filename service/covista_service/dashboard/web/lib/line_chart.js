@@ -1,22 +1,11 @@
 // Shares over time as steps, with a strip below that says how they were found; a cursor tells the values of a moment.
 import { computed, onMounted, onUnmounted, ref } from "vue";
+import { marks } from "covista/moments.js";
 
 const HEIGHT = 240;
 const [LEFT, RIGHT, TOP, BOTTOM] = [44, 14, 10, 56];
 const STRIP = 12;
-const STEPS_S = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400];
 const TICK_PX = 90;
-
-export const clock = (ms, seconds = true) =>
-  new Date(ms).toLocaleTimeString("en-GB", { hour: "2-digit", minute: "2-digit", ...(seconds ? { second: "2-digit" } : {}) });
-
-// Round moments of the clock within a span, about so many.
-export function momentsOf(from, to, most) {
-  const step = 1000 * (STEPS_S.find((each) => (to - from) / 1000 / each <= most) ?? STEPS_S.at(-1));
-  const moments = [];
-  for (let at = Math.ceil(from / step) * step; at <= to; at += step) moments.push(at);
-  return { moments, seconds: step < 60000 };
-}
 
 // The place of the last moment that is not after `ms`; -1 before the first.
 export function placeAt(moments, ms) {
@@ -66,10 +55,10 @@ export default {
     const y = (share) => TOP + (1 - share) * (HEIGHT - TOP - BOTTOM);
     const chart = computed(() => {
       const { moments, from, to } = props;
-      const ticks = momentsOf(from, to, Math.max(2, (width.value - LEFT - RIGHT) / TICK_PX));
+      const most = Math.max(2, (width.value - LEFT - RIGHT) / TICK_PX);
       return {
         a: stepsOf(moments, "a", x, y, to), b: stepsOf(moments, "b", x, y, to), stretches: stretchesOf(moments, x, to),
-        ticks: ticks.moments.map((ms) => ({ ms, x: x(ms), words: clock(ms, ticks.seconds) })),
+        ticks: marks(from, to, most).map(({ ms, words }) => ({ ms, x: x(ms), words })),
         shares: [0, 0.25, 0.5, 0.75, 1].map((share) => ({ share, y: y(share) })),
         gaps: props.gaps.filter((gap) => gap.to > from && gap.from < to).map((gap) => ({ ...gap, x: x(gap.from), width: Math.max(2, x(Math.min(gap.to, to)) - x(gap.from)) })),
       };

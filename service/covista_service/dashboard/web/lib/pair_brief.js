@@ -33,7 +33,7 @@ export default {
         </li>
       </ul>
       <dl class="cv-facts">
-        <dt>Found</dt><dd>{{ facts.how }} {{ facts.why_not ?? (facts.inliers ? facts.inliers + ' matched points agree.' : '') }}</dd>
+        <dt>Found</dt><dd>{{ facts.how }} {{ facts.why_not ?? facts.matched }}</dd>
         <dt>Age</dt><dd>{{ facts.age_s === null ? 'nothing found yet' : ago(facts.age_s) }}</dd>
         <dt>Similarity</dt><dd>{{ number(facts.similarity) }} <span class="cv-soft">closeness {{ number(facts.closeness) }}</span></dd>
         <dt>Distance</dt><dd>{{ facts.distance_m === null ? 'not known: one of them is gone, or has told no pose' : metres(facts.distance_m) }}</dd>

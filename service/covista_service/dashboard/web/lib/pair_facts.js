@@ -1,6 +1,7 @@
 // What is known of two robots, asked for when others are chosen and again each second.
 import { ref, shallowRef, watch } from "vue";
 import { asked, data } from "covista/ask.js";
+import { msOf } from "covista/moments.js";
 import { pulse } from "covista/pulse.js";
 
 const EVERY_MS = 1000;
@@ -9,17 +10,19 @@ const RESTS_MS = 90;
 
 export const isId = (name) => /^[a-z0-9][a-z0-9_-]{0,62}$/.test(name ?? "");
 
-// For `setup`. `pair` is a ref of [a, b] or null; gives the facts of these two alone (null before they are there), and
-// why they are no pair for the station.
+// For `setup`. `pair` is a ref of [a, b] or null; gives the facts of these two alone (null before they are there), why
+// they are no pair for the station, and how far its clock is ahead of this one (null before it has answered).
 export function usePairFacts(pair) {
   const facts = shallowRef(null);
   const problem = ref("");
+  const aheadMs = ref(null);
   let timer = null;
 
   async function ask() {
     const [a, b] = pair.value ?? [];
     if (!isId(a) || !isId(b) || a === b) return;
     const found = await asked(data(`/pair?a=${a}&b=${b}`));
+    aheadMs.value = msOf(found.time) - Date.now();
     if (pair.value?.[0] !== a || pair.value?.[1] !== b) return;
     problem.value = found.problem ?? "";
     facts.value = found.problem ? null : found;
@@ -33,5 +36,5 @@ export function usePairFacts(pair) {
     timer = setTimeout(() => ask().catch(() => {}), RESTS_MS);
   });
   pulse(ask, EVERY_MS);
-  return { facts, problem };
+  return { facts, problem, aheadMs };
 }

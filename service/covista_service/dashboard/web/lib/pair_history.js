@@ -1,9 +1,10 @@
 // The history of a pair's overlap, as a chart and in words.
-import { computed, ref } from "vue";
+import { computed, ref, toRef } from "vue";
 import { choose, chosenIn } from "covista/address.js";
 import { percent } from "covista/looks.js";
+import { clock } from "covista/moments.js";
 import { usePairPast } from "covista/pair_past.js";
-import LineChart, { clock } from "covista/line_chart.js";
+import LineChart from "covista/line_chart.js";
 
 const SPANS = [[2, "2 min"], [10, "10 min"], [60, "1 h"]];
 const FOUND = { image: "found in images", predicted: "predicted", decayed: "old", unknown: "not known" };
@@ -11,11 +12,12 @@ const ROWS = 50;
 
 export default {
   components: { LineChart },
-  props: { a: String, b: String },
+  // `aheadMs`: how far the station's clock is ahead of this one.
+  props: { a: String, b: String, aheadMs: { type: Number, default: null } },
   setup(props) {
     const wanted = Number(chosenIn("minutes"));
     const minutes = ref(SPANS.some(([span]) => span === wanted) ? wanted : 10);
-    const { past, problem } = usePairPast(computed(() => [props.a, props.b]), minutes);
+    const { past, problem } = usePairPast(computed(() => [props.a, props.b]), minutes, toRef(props, "aheadMs"));
     const names = computed(() => ({ a: `how much of ${props.a}'s view ${props.b} sees`, b: `how much of ${props.b}'s view ${props.a} sees` }));
     const open = ref(false);
     const rows = computed(() => (open.value && past.value ? past.value.moments.slice(-ROWS).reverse() : []));

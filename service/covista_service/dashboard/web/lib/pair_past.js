@@ -29,9 +29,24 @@ export function joined(held, found, from) {
   return sorted.slice(Math.max(0, first));
 }
 
+// All that is kept from a time on, page by page.
+async function read(a, b, since) {
+  const found = { items: [], gaps: [] };
+  let cursor = "";
+  for (let page = 0; page < MOST_PAGES && cursor !== null; page++) {
+    const from = encodeURIComponent(new Date(since).toISOString());
+    const more = cursor ? `&cursor=${cursor}` : "";
+    const { items, gaps: missing, next } = await asked(rest(`/pairs/${a}/${b}/history?limit=${PAGE}&from=${from}${more}`));
+    found.items.push(...items);
+    found.gaps.push(...missing);
+    cursor = next;
+  }
+  return found;
+}
+
 // For `setup`: `past` is { moments, gaps, from, to } or null, `problem` why there is none. `pair` is a ref of [a, b],
-// `minutes` a ref.
-export function usePairPast(pair, minutes) {
+// `minutes` a ref, and `aheadMs` one of how far the station's clock is ahead of this one, null as long as that is not known.
+export function usePairPast(pair, minutes, aheadMs) {
   const past = shallowRef(null);
   const problem = shallowRef(null);
   let held = [];
@@ -39,26 +54,12 @@ export function usePairPast(pair, minutes) {
   let readTo = null;
   let of = "";
 
-  async function read(a, b, since) {
-    const found = { items: [], gaps: [] };
-    let cursor = "";
-    for (let page = 0; page < MOST_PAGES && cursor !== null; page++) {
-      const from = encodeURIComponent(new Date(since).toISOString());
-      const more = cursor ? `&cursor=${cursor}` : "";
-      const { items, gaps: missing, next } = await asked(rest(`/pairs/${a}/${b}/history?limit=${PAGE}&from=${from}${more}`));
-      found.items.push(...items);
-      found.gaps.push(...missing);
-      cursor = next;
-    }
-    return found;
-  }
-
   const tell = toTop();
   const beat = pulse(async () => {
     const [a, b] = pair.value ?? [];
-    if (!isId(a) || !isId(b) || a === b) return;
+    if (!isId(a) || !isId(b) || a === b || aheadMs.value === null) return;
     const wanted = `${a} ${b} ${minutes.value}`;
-    const now = Date.now();
+    const now = Date.now() + aheadMs.value;
     const start = now - 60000 * minutes.value;
     if (wanted !== of) [held, gaps, readTo, of] = [[], [], null, wanted];
     try {
@@ -83,5 +84,6 @@ export function usePairPast(pair, minutes) {
     of = "";
     beat();
   });
+  watch(() => aheadMs.value === null, beat);
   return { past, problem };
 }

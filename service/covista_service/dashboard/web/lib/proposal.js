@@ -2,6 +2,29 @@
 import { computed, reactive, ref, shallowRef, watch } from "vue";
 import { differing, flat, fromAddress, same, toAddress } from "covista/settings_words.js";
 
+// What an address names, as `wanted` values by name, and as words what it names that is none.
+function readFrom(query, choices) {
+  const [wanted, unread] = [{}, []];
+  for (const [name, text] of new URLSearchParams(query)) {
+    const choice = choices.find((each) => each.name === name);
+    const value = choice && fromAddress(choice, text);
+    if (value === undefined) unread.push(`${name}=${text}`);
+    else wanted[name] = value;
+  }
+  return { wanted, unread };
+}
+
+function writeTo(address, changes) {
+  const query = changes.map(({ name, value }) => `${name}=${encodeURIComponent(toAddress(value))}`).join("&");
+  history.replaceState(history.state, "", address.pathname + (query ? `?${query}` : "") + address.hash);
+}
+
+const changesIn = (choices, wanted, live) =>
+  choices
+    .filter(({ name }) => name in wanted && !same(wanted[name], live[name]))
+    .map((choice) => ({ name: choice.name, choice, value: wanted[choice.name], was: live[choice.name] }));
+
+// For `setup`.
 export function useProposal() {
   const choices = shallowRef([]);
   const live = shallowRef(null);
@@ -11,12 +34,7 @@ export function useProposal() {
   // What the address names and is no setting, or no value of one.
   const unread = ref([]);
 
-  const changes = computed(() => {
-    if (!live.value) return [];
-    return choices.value
-      .filter(({ name }) => name in wanted && !same(wanted[name], live.value[name]))
-      .map((choice) => ({ name: choice.name, choice, value: wanted[choice.name], was: live.value[choice.name] }));
-  });
+  const changes = computed(() => (live.value ? changesIn(choices.value, wanted, live.value) : []));
   const others = computed(() => (live.value ? differing(seen.value, live.value) : []));
 
   const valueOf = (name) => (name in wanted ? wanted[name] : live.value[name]);
@@ -44,17 +62,13 @@ export function useProposal() {
 
   const read = (known) => {
     choices.value = known;
-    for (const [name, text] of new URLSearchParams(location.search)) {
-      const choice = known.find((each) => each.name === name);
-      const value = choice && fromAddress(choice, text);
-      if (value === undefined) unread.value.push(`${name}=${text}`);
-      else wanted[name] = value;
-    }
+    const found = readFrom(location.search, known);
+    Object.assign(wanted, found.wanted);
+    unread.value.push(...found.unread);
   };
   watch([changes, choices], ([now]) => {
     if (!live.value || !choices.value.length) return;
-    const query = now.map(({ name, value }) => `${name}=${encodeURIComponent(toAddress(value))}`).join("&");
-    history.replaceState(history.state, "", location.pathname + (query ? `?${query}` : "") + location.hash);
+    writeTo(location, now);
   });
   return { choices, live, changes, others, unread, valueOf, set, reset, noted, take, given, read };
 }

@@ -1,5 +1,6 @@
 // The score of every number of groups, with the one that is shown and the one that is proposed.
 import { computed, onMounted, onUnmounted, ref } from "vue";
+import { bestOf } from "covista/score_best.js";
 
 const HEIGHT = 190;
 const [LEFT, RIGHT, TOP, BOTTOM] = [40, 12, 24, 34];
@@ -15,10 +16,6 @@ export function ticksOf(low, high) {
   for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) ticks.push(Number((k * step).toPrecision(6)));
   return ticks;
 }
-
-// The number with the best score; the smaller of two as good.
-export const bestOf = (scores) =>
-  scores.length ? scores.reduce((best, each) => (each.score > best.score + 1e-9 ? each : best)).groups : null;
 
 export default {
   props: { scores: { type: Array, required: true }, chosen: { type: Number, default: null } },
@@ -37,7 +34,7 @@ export default {
       const [bottom, top] = [low < 0 ? low - pad : low, high + pad];
       const x = (groups) => LEFT + ((groups - first + 0.5) / (last - first + 1)) * (width.value - LEFT - RIGHT);
       const y = (score) => TOP + ((top - score) / (top - bottom)) * (HEIGHT - TOP - BOTTOM);
-      const best = bestOf(props.scores);
+      const best = bestOf(props.scores)?.groups;
       const dots = props.scores.map(({ groups, score }) => ({
         groups, x: x(groups), y: y(score), zero: y(0), shown: groups === props.chosen, best: groups === best,
         words: `${groups}: ${score.toFixed(3)}`,
@@ -56,7 +53,7 @@ export default {
     const words = computed(() => {
       const told = [...props.scores].sort((a, b) => b.score - a.score).slice(0, TOLD).sort((a, b) => a.groups - b.groups);
       const all = told.length === props.scores.length ? "Scores by number of groups" : `The ${TOLD} best scores by number of groups`;
-      return `${all}: ${told.map((each) => `${each.groups}: ${each.score.toFixed(2)}`).join(", ")}. Shown: ${props.chosen ?? "none"}; best: ${bestOf(props.scores) ?? "none"}.`;
+      return `${all}: ${told.map((each) => `${each.groups}: ${each.score.toFixed(2)}`).join(", ")}. Shown: ${props.chosen ?? "none"}; best: ${bestOf(props.scores)?.groups ?? "none"}.`;
     });
     return { room, width, chart, words, HEIGHT, LEFT, RIGHT, TOP, BOTTOM };
   },

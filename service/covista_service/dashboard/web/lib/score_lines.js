@@ -1,9 +1,8 @@
 // The score of every number of groups under two settings: a line each, the highest marked, and the same as a table.
 import { computed } from "vue";
+import { bestOf } from "covista/score_best.js";
 
 const [WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM] = [360, 150, 14, 12, 12, 24];
-
-const best = (scores) => scores.reduce((most, each) => (each.score > most.score ? each : most), scores[0]);
 
 export default {
   props: { now: { type: Object, required: true }, then: { type: Object, default: null } },
@@ -29,7 +28,7 @@ export default {
         const [low, high] = spanOf(alike.value ? reports.value : [each]);
         const y = (score) => HEIGHT - BOTTOM - ((score - low) / (high - low || 1)) * (HEIGHT - TOP - BOTTOM);
         const scores = [...each.report.scores].sort((a, b) => a.groups - b.groups);
-        const top = best(scores);
+        const top = bestOf(scores);
         return { ...each, top, at: [x(top.groups), y(top.score)], points: scores.map(({ groups, score }) => `${x(groups)},${y(score)}`).join(" ") };
       }));
     const ticks = computed(() => {
