@@ -1,5 +1,6 @@
 // Settings that somebody tries, beside those in force. They stand in the address, so that they can be handed on.
 import { computed, reactive, ref, shallowRef, watch } from "vue";
+import { write } from "covista/address.js";
 import { differing, flat, fromAddress, same, toAddress } from "covista/settings_words.js";
 
 // What an address names, as `wanted` values by name, and as words what it names that is none.
@@ -16,7 +17,7 @@ function readFrom(query, choices) {
 
 function writeTo(address, changes) {
   const query = changes.map(({ name, value }) => `${name}=${encodeURIComponent(toAddress(value))}`).join("&");
-  history.replaceState(history.state, "", address.pathname + (query ? `?${query}` : "") + address.hash);
+  write(address.pathname + (query ? `?${query}` : "") + address.hash);
 }
 
 const changesIn = (choices, wanted, live) =>
