@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from covista_schemas.reports import Health, PartHealth, Status
 
 from covista_service.dashboard.checkup import Checkup
-from covista_service.dashboard.health_counts import MB, counts, facts, waiting
+from covista_service.dashboard.health_counts import MB, counts, facts, several, waiting
 from covista_service.dashboard.reasons import TROUBLES, UNTOLD
 from covista_service.station.census import Census
 from covista_service.station.ledger import Counts
@@ -161,9 +161,17 @@ def presence(census: Census) -> str:
     total = sum(census.robots.values())
     if not total:
         return "No robot has been heard yet."
-    names = {Status.LIVE: "live", Status.STALE: "silent", Status.GONE: "gone"}
-    some = ", ".join(f"{census.robots[status]} {word}" for status, word in names.items() if census.robots.get(status))
-    return f"{total} {'robot' if total == 1 else 'robots'} ({some}) in {census.groups} groups."
+    some = ", ".join(f"{census.robots[status]} {status}" for status in Status if census.robots.get(status))
+    return f"{several(total, 'robot')} ({some}){_grouped(census, total)}"
+
+
+def _grouped(census: Census, total: int) -> str:
+    poseless, absent = census.ungrouped.get("no_pose", 0), sum(census.ungrouped.values())
+    untold = f" {poseless} {'has' if poseless == 1 else 'have'} told no pose yet." if poseless else ""
+    if not census.groups:
+        return f", in no group.{untold}"
+    groups = several(census.groups, "group")
+    return f", {total - absent} of them in {groups}.{untold}" if absent else f" in {groups}."
 
 
 def odd_robots(robots: Sequence[RobotView]) -> list[dict[str, Any]]:
