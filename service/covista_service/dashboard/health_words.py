@@ -98,30 +98,39 @@ def attention(checkup: Checkup) -> Iterator[dict[str, Any]]:
         if each["status"] != "ready":
             said = f": {each['detail']}" if each["detail"] else ""
             level = "warn" if each["status"] == "starting" else "bad"
-            yield _need(level, f"{each['title']} is {each['status']}{said}. {each['means']}", each["todo"])
+            yield _need(
+                f"part/{each['name']}",
+                level,
+                f"{each['title']} is {each['status']}{said}. {each['means']}",
+                each["todo"],
+            )
     yield from _overfull(checkup)
     yield from _amiss(checkup.robots)
     if not checkup.robots:
-        yield _need("note", "No robot has been heard yet.", "See that rovers are on and connect to this station.")
+        yield _need(
+            "robots", "note", "No robot has been heard yet.", "See that rovers are on and connect to this station."
+        )
 
 
 def _overfull(checkup: Checkup) -> Iterator[dict[str, Any]]:
     vitals = checkup.vitals
     if vitals.mail.payload_bytes > _MUCH_MAIL_BYTES:
         says = f"{vitals.mail.payload_bytes / MB:.0f} MB of mail wait unopened: more comes than the station can take."
-        yield _need("warn", says, "Have robots send less often, or give the station more workers.")
+        yield _need("mail", "warn", says, "Have robots send less often, or give the station more workers.")
     for name, sink in vitals.sinks.items():
         if sink.waiting > _MUCH_NEWS:
-            yield _need("warn", f"{sink.waiting} entries wait for {name}.", TROUBLES.get(name, UNTOLD).todo)
+            says = f"{sink.waiting} entries wait for {name}."
+            yield _need(f"news/{name}", "warn", says, TROUBLES.get(name, UNTOLD).todo)
     if checkup.pages > 0.9 * checkup.most_pages:
         says = f"{checkup.pages} of {checkup.most_pages} pages are open; soon nobody can open another."
-        yield _need("warn", says, "Close pages that nobody reads.")
+        yield _need("pages", "warn", says, "Close pages that nobody reads.")
 
 
 def _amiss(robots: Sequence[RobotView]) -> Iterator[dict[str, Any]]:
     off = sorted(view.id for view in robots if _has_clock_off(view))
     if off:
         yield _need(
+            "clocks",
             "warn",
             f"{_robots(off)} a clock that is off by more than {_CLOCK_OFF_S:.0f} s.",
             "Groups are right all the same, for times of arrival count. Set the clock, so that logs can be compared.",
@@ -130,6 +139,7 @@ def _amiss(robots: Sequence[RobotView]) -> Iterator[dict[str, Any]]:
     wrong = sorted(view.id for view in robots if _has_pose_off(view))
     if wrong:
         yield _need(
+            "poses",
             "warn",
             f"{_robots(wrong)} poses that keep disagreeing with the pictures; the station corrects them.",
             "Look at the localisation, and at how the camera is mounted.",
@@ -214,8 +224,9 @@ def _fates(topic: str, account: Counts) -> dict[str, Any]:
     }
 
 
-def _need(level: str, says: str, todo: str, robots: Sequence[str] = ()) -> dict[str, Any]:
-    return {"level": level, "says": says, "todo": todo, "robots": robots[:_MOST_NAMED]}
+def _need(key: str, level: str, says: str, todo: str, robots: Sequence[str] = ()) -> dict[str, Any]:
+    """One that needs somebody; `key` stays the same while it lasts, whatever numbers it says."""
+    return {"key": key, "level": level, "says": says, "todo": todo, "robots": robots[:_MOST_NAMED]}
 
 
 def _has_clock_off(view: RobotView) -> bool:

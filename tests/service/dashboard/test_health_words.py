@@ -145,6 +145,21 @@ def test_robots_are_counted_by_presence(
     assert told(checkup(census=census))["robots"] == words
 
 
+def test_a_need_keeps_its_key_while_its_numbers_change() -> None:
+    def keys(more: int) -> list[str]:
+        vitals = checkup().vitals
+        sinks = {"history": SinkStatus(501 + more, told=0, lost=0), "zenoh": SinkStatus(501 + more, 0, 0)}
+        vitals = replace(vitals, mail=Depths(3, 4, 200_000_000 + more * 10**6), sinks=sinks)
+        robots = [robot(f"r{k}", clock_offset_s=11.0, correction=Correction(4, 1, 3 + more)) for k in range(1 + more)]
+        parts = READY | {"store": PartHealth(status="degraded", detail=f"{more} entries wait")}
+        health = Health(status="degraded", parts=parts)
+        found = checkup(health=health, vitals=vitals, robots=robots, pages=250 + more)
+        return [each["key"] for each in told(found)["attention"]]
+
+    assert keys(0) == keys(3)
+    assert len(set(keys(0))) == 7
+
+
 def test_clocks_that_are_off_are_told_with_their_robots_and_small_offsets_are_not() -> None:
     robots = [robot("r1", clock_offset_s=9.9), robot("r2", clock_offset_s=-40.0), robot("r3", clock_offset_s=11.0)]
     found = told(checkup(robots=robots))
