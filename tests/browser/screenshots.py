@@ -30,13 +30,15 @@ _SMALL, _SMALL_PX = ("swarm", "timeline"), 640
 
 @dataclass(frozen=True, slots=True)
 class Shot:
-    """A page as it is to be seen; `full` shows all of it, however long."""
+    """A page as it is to be seen after `settled_s`; `full` shows all of it, however long."""
 
     name: str
     path: str
     size_px: tuple[int, int] = _WIDE
     dark: bool = False
     full: bool = True
+    # Pictures come and the map settles.
+    settled_s: float = 5
 
 
 SHOTS = (
@@ -47,7 +49,8 @@ SHOTS = (
     Shot("robot", "/robots/r1"),
     Shot("timeline", "/timeline"),
     Shot("what_if", "/what-if?groups=3&criterion=gain"),
-    Shot("health", "/health"),
+    # Until rates are told.
+    Shot("health", "/health", settled_s=25),
 )
 
 
@@ -77,8 +80,7 @@ def _take(browser: Browser, url: str, shot: Shot, folder: Path) -> None:
     width, height = shot.size_px
     page = browser.new_page(viewport={"width": width, "height": height}, color_scheme="dark" if shot.dark else "light")
     page.goto(f"{url}/dashboard{shot.path}")
-    # Pictures come and the map settles.
-    page.wait_for_timeout(5000)
+    page.wait_for_timeout(1000 * shot.settled_s)
     _keep(Image.open(BytesIO(page.screenshot(full_page=shot.full))), folder / f"{shot.name}.png")
     page.close()
 

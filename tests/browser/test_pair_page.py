@@ -137,7 +137,7 @@ def test_the_past_is_drawn_and_read_with_arrow_keys(page: Page) -> None:
     expect(told).to_contain_text(re.compile(r"\d+ %|unknown"))
     assert kept
     page.get_by_label("Last").select_option("60")
-    assert "minutes=60" in page.url
+    expect(page).to_have_url(re.compile("minutes=60"))
 
 
 @pytest.mark.parametrize("hours", [1, -1])

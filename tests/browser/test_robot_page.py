@@ -9,7 +9,7 @@ import httpx
 import pytest
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Page
+    from playwright.sync_api import Page, Route
 
 expect = pytest.importorskip("playwright.sync_api").expect
 
@@ -57,6 +57,22 @@ def test_neighbours_are_those_that_share_its_view_the_most_first(page: Page, sta
     assert shared[names[0]] >= shared[best] - 0.05
     link = rows.first.get_by_role("link", name=f"What r1 and {names[0]} both see")
     expect(link).to_have_attribute("href", re.compile(f"/dashboard/pairs/r1/{names[0]}$"))
+
+
+def test_neighbours_that_are_silent_are_marked_in_words(page: Page) -> None:
+    def answer(route: Route) -> None:
+        silent = {"r3": {"status": "stale", "silent_s": 12.3}, "r5": {"status": "gone", "silent_s": None}}
+        route.fulfill(json=route.fetch().json() | {"silent": silent})
+
+    page.route("**/robots/r1/words", answer)
+    opened(page)
+    rows = page.locator("section[aria-labelledby=cv-neighbours] tbody tr")
+    expect(rows.first).to_be_visible()
+    words = {name.split()[0]: " ".join(name.split()[1:]) for name in rows.locator("th").all_inner_texts()}
+    assert words.keys() >= {"r3", "r5"}
+    silent = {"r3": "stale, silent for 12 s", "r5": "gone"}
+    assert words == {name: silent.get(name, "") for name in words}
+    page.unroute_all(behavior="ignoreErrors")
 
 
 def test_what_it_sends_is_accounted_for(page: Page, station: Any) -> None:

@@ -37,6 +37,7 @@ async def words(robot: RobotPath, sources: SourcesNow) -> Response:
     if view is not None:
         found |= {
             "standing": robot_words.standing(snapshot, view),
+            "silent": robot_words.silent_beside(snapshot, view),
             "clock": robot_words.clock(view.clock_offset_s),
             "pose": robot_words.pose(view),
             "dropped": robot_words.dropped(view),

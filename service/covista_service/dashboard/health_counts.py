@@ -24,6 +24,11 @@ MB = 1e6
 _MOST_CONCERNED = 3
 
 
+def several(count: int, one: str, more: str = "") -> str:
+    """A number of things: 1 group, 2 groups."""
+    return f"{count} {one if count == 1 else more or f'{one}s'}"
+
+
 def counts(checkup: Checkup) -> Iterator[dict[str, Any]]:
     """Everything that went wrong since the start, by reason, with who is most concerned."""
     for topic, account in checkup.census.accounts.items():
@@ -84,22 +89,26 @@ def facts(checkup: Checkup) -> Iterator[tuple[str, str]]:
     crew, census, store = checkup.vitals.crew, checkup.census, checkup.vitals.sinks.get("history")
     yield "Workers", _workers(checkup)
     if store is not None:
-        yield "Database", f"{store.told} entries given to it, {store.waiting} wait, {store.lost} lost."
-    compared = f"{checkup.summary.surveys} pairs compared since the start"
+        yield (
+            "Database",
+            f"{several(store.told, 'entry', 'entries')} given to it, {store.waiting} waiting, {store.lost} lost.",
+        )
+    compared = f"{several(checkup.summary.surveys, 'pair')} compared since the start"
     yield "Surveys", f"{compared}, {census.workload.outdated} overtaken by newer keyframes."
-    yield "Kept", f"Keyframes of {census.keyframes} robots, records of {census.pairs} pairs."
-    listening = f"{checkup.vitals.sessions} sessions on zenoh, {checkup.listeners} listeners to events over REST"
-    yield "Who listens", f"{listening}, {checkup.pages} of at most {checkup.most_pages} pages open."
+    yield "Kept", f"Keyframes of {several(census.keyframes, 'robot')}, records of {several(census.pairs, 'pair')}."
+    sessions = f"{several(checkup.vitals.sessions, 'session')} on zenoh"
+    listeners = f"{several(checkup.listeners, 'listener')} to events over REST"
+    yield "Who listens", f"{sessions}, {listeners}, {checkup.pages} of at most {checkup.most_pages} pages open."
     if checkup.timings.memory_bytes is not None:
         yield "Memory", f"{checkup.timings.memory_bytes / MB:.0f} MB in the station's own process."
     if crew.shipped_bytes:
-        again = f", {crew.shipped_again} times again" if crew.shipped_again else ""
+        again = f", {several(crew.shipped_again, 'time')} again" if crew.shipped_again else ""
         yield "Sent to workers", f"{crew.shipped_bytes / MB:.0f} MB of features{again}."
 
 
 def _workers(checkup: Checkup) -> str:
     crew = checkup.vitals.crew
-    said = [f"{crew.capacity} jobs at a time, {crew.kind}"]
+    said = [f"{several(crew.capacity, 'job')} at a time, {crew.kind}"]
     said += [] if crew.warm else ["still loading compiled code"]
     said += [each for each in (crew.fallback, crew.remark) if each is not None]
     return f"{'; '.join(said)}."

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from covista_schemas.reports import Health, PartHealth, Status
 
 from covista_service.dashboard.checkup import Checkup
-from covista_service.dashboard.health_counts import MB, counts, facts, waiting
+from covista_service.dashboard.health_counts import MB, counts, facts, several, waiting
 from covista_service.dashboard.reasons import TROUBLES, UNTOLD
 from covista_service.station.census import Census
 from covista_service.station.ledger import Counts
@@ -98,30 +98,39 @@ def attention(checkup: Checkup) -> Iterator[dict[str, Any]]:
         if each["status"] != "ready":
             said = f": {each['detail']}" if each["detail"] else ""
             level = "warn" if each["status"] == "starting" else "bad"
-            yield _need(level, f"{each['title']} is {each['status']}{said}. {each['means']}", each["todo"])
+            yield _need(
+                f"part/{each['name']}",
+                level,
+                f"{each['title']} is {each['status']}{said}. {each['means']}",
+                each["todo"],
+            )
     yield from _overfull(checkup)
     yield from _amiss(checkup.robots)
     if not checkup.robots:
-        yield _need("note", "No robot has been heard yet.", "See that rovers are on and connect to this station.")
+        yield _need(
+            "robots", "note", "No robot has been heard yet.", "See that rovers are on and connect to this station."
+        )
 
 
 def _overfull(checkup: Checkup) -> Iterator[dict[str, Any]]:
     vitals = checkup.vitals
     if vitals.mail.payload_bytes > _MUCH_MAIL_BYTES:
         says = f"{vitals.mail.payload_bytes / MB:.0f} MB of mail wait unopened: more comes than the station can take."
-        yield _need("warn", says, "Have robots send less often, or give the station more workers.")
+        yield _need("mail", "warn", says, "Have robots send less often, or give the station more workers.")
     for name, sink in vitals.sinks.items():
         if sink.waiting > _MUCH_NEWS:
-            yield _need("warn", f"{sink.waiting} entries wait for {name}.", TROUBLES.get(name, UNTOLD).todo)
+            says = f"{sink.waiting} entries wait for {name}."
+            yield _need(f"news/{name}", "warn", says, TROUBLES.get(name, UNTOLD).todo)
     if checkup.pages > 0.9 * checkup.most_pages:
         says = f"{checkup.pages} of {checkup.most_pages} pages are open; soon nobody can open another."
-        yield _need("warn", says, "Close pages that nobody reads.")
+        yield _need("pages", "warn", says, "Close pages that nobody reads.")
 
 
 def _amiss(robots: Sequence[RobotView]) -> Iterator[dict[str, Any]]:
     off = sorted(view.id for view in robots if _has_clock_off(view))
     if off:
         yield _need(
+            "clocks",
             "warn",
             f"{_robots(off)} a clock that is off by more than {_CLOCK_OFF_S:.0f} s.",
             "Groups are right all the same, for times of arrival count. Set the clock, so that logs can be compared.",
@@ -130,6 +139,7 @@ def _amiss(robots: Sequence[RobotView]) -> Iterator[dict[str, Any]]:
     wrong = sorted(view.id for view in robots if _has_pose_off(view))
     if wrong:
         yield _need(
+            "poses",
             "warn",
             f"{_robots(wrong)} poses that keep disagreeing with the pictures; the station corrects them.",
             "Look at the localisation, and at how the camera is mounted.",
@@ -161,9 +171,17 @@ def presence(census: Census) -> str:
     total = sum(census.robots.values())
     if not total:
         return "No robot has been heard yet."
-    names = {Status.LIVE: "live", Status.STALE: "silent", Status.GONE: "gone"}
-    some = ", ".join(f"{census.robots[status]} {word}" for status, word in names.items() if census.robots.get(status))
-    return f"{total} {'robot' if total == 1 else 'robots'} ({some}) in {census.groups} groups."
+    some = ", ".join(f"{census.robots[status]} {status}" for status in Status if census.robots.get(status))
+    return f"{several(total, 'robot')} ({some}){_grouped(census, total)}"
+
+
+def _grouped(census: Census, total: int) -> str:
+    poseless, absent = census.ungrouped.get("no_pose", 0), sum(census.ungrouped.values())
+    untold = f" {poseless} {'has' if poseless == 1 else 'have'} told no pose yet." if poseless else ""
+    if not census.groups:
+        return f", in no group.{untold}"
+    groups = several(census.groups, "group")
+    return f", {total - absent} of them in {groups}.{untold}" if absent else f" in {groups}."
 
 
 def odd_robots(robots: Sequence[RobotView]) -> list[dict[str, Any]]:
@@ -206,8 +224,9 @@ def _fates(topic: str, account: Counts) -> dict[str, Any]:
     }
 
 
-def _need(level: str, says: str, todo: str, robots: Sequence[str] = ()) -> dict[str, Any]:
-    return {"level": level, "says": says, "todo": todo, "robots": robots[:_MOST_NAMED]}
+def _need(key: str, level: str, says: str, todo: str, robots: Sequence[str] = ()) -> dict[str, Any]:
+    """One that needs somebody; `key` stays the same while it lasts, whatever numbers it says."""
+    return {"key": key, "level": level, "says": says, "todo": todo, "robots": robots[:_MOST_NAMED]}
 
 
 def _has_clock_off(view: RobotView) -> bool:

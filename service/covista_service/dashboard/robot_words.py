@@ -7,11 +7,13 @@ from typing import Any
 
 from covista_schemas.reports import Status
 
+from covista_service.dashboard.frames import silence_s
 from covista_service.dashboard.reasons import DROPPED, UNTOLD
 from covista_service.station.corrections import Correction
 from covista_service.station.events import Keyframe
 from covista_service.station.ledger import Counts
 from covista_service.station.options import NS_PER_S
+from covista_service.station.pairs import pair_of
 from covista_service.station.snapshot import RobotView, Snapshot
 
 _UNGROUPED = {"no_pose": "It has told no pose yet, so it stands in no group.", "gone": "So it stands in no group."}
@@ -42,6 +44,15 @@ def _presence(view: RobotView, wall_ns: int) -> str:
             return f"{view.id} is stale: nothing came from it for {silent or 'a while'}."
         case _:
             return f"{view.id} is gone: nothing came from it for {silent or 'long'}. What is shown is the last of it."
+
+
+def silent_beside(snapshot: Snapshot, view: RobotView) -> dict[str, dict[str, Any]]:
+    """Those that are not live, of the robots that may share its view: how they are, and for how long silent."""
+    return {
+        other.id: {"status": other.status, "silent_s": silence_s(other, snapshot.wall_ns)}
+        for other in snapshot.robots.values()
+        if other.status is not Status.LIVE and pair_of(view.id, other.id) in snapshot.records
+    }
 
 
 def clock(offset_s: float | None) -> str:

@@ -41,7 +41,7 @@ async def _body(sources: Sources) -> dict[str, Any]:
 def test_the_station_is_told_of_as_it_is(sources: Sources) -> None:
     crowded = replace(sources, listeners=lambda: 3, given_up=lambda: {"slow": 4})
     told = asyncio.run(_body(crowded))
-    assert (told["station"], told["status"], told["robots"]) == ("here", "ready", "1 robot (1 live) in 1 groups.")
+    assert (told["station"], told["status"], told["robots"]) == ("here", "ready", "1 robot (1 live) in 1 group.")
     counts = {each["key"]: each["total"] for each in told["counts"]}
     assert counts["Client given up/slow"] == 4
     assert counts["Not let in on zenoh/unlisted"] == 3

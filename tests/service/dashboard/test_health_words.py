@@ -29,7 +29,7 @@ from covista_service.station.census import Census
 from covista_service.station.corrections import Correction
 from covista_service.station.events import Topic
 from covista_service.station.ledger import FORGOTTEN, Counts
-from covista_service.station.snapshot import RobotView
+from covista_service.station.snapshot import Reason, RobotView
 from covista_service.station.workload import Workload
 from covista_service.telemetry import WORKER_FAILED, Telemetry
 
@@ -127,9 +127,37 @@ def test_a_station_that_no_robot_speaks_to_says_so_without_alarm() -> None:
     assert told(checkup(robots=[]))["robots"] == "No robot has been heard yet."
 
 
-def test_robots_are_counted_by_presence() -> None:
-    robots = [robot("r1"), robot("r2", status=Status.STALE), robot("r3", status=Status.GONE), robot("r4")]
-    assert told(checkup(robots=robots))["robots"] == "4 robots (2 live, 1 silent, 1 gone) in 2 groups."
+@pytest.mark.parametrize(
+    ("statuses", "groups", "ungrouped", "words"),
+    [
+        ({"live": 1}, 1, {}, "1 robot (1 live) in 1 group."),
+        ({"live": 3, "stale": 1}, 2, {}, "4 robots (3 live, 1 stale) in 2 groups."),
+        ({"live": 2, "gone": 1}, 1, {"gone": 1}, "3 robots (2 live, 1 gone), 2 of them in 1 group."),
+        ({"live": 3}, 2, {"no_pose": 1}, "3 robots (3 live), 2 of them in 2 groups. 1 has told no pose yet."),
+        ({"live": 2}, 0, {"no_pose": 2}, "2 robots (2 live), in no group. 2 have told no pose yet."),
+    ],
+)
+def test_robots_are_counted_by_presence(
+    statuses: dict[str, int], groups: int, ungrouped: dict[Reason, int], words: str
+) -> None:
+    there = Counter({Status(status): count for status, count in statuses.items()})
+    census = replace(checkup().census, robots=there, groups=groups, ungrouped=ungrouped)
+    assert told(checkup(census=census))["robots"] == words
+
+
+def test_a_need_keeps_its_key_while_its_numbers_change() -> None:
+    def keys(more: int) -> list[str]:
+        vitals = checkup().vitals
+        sinks = {"history": SinkStatus(501 + more, told=0, lost=0), "zenoh": SinkStatus(501 + more, 0, 0)}
+        vitals = replace(vitals, mail=Depths(3, 4, 200_000_000 + more * 10**6), sinks=sinks)
+        robots = [robot(f"r{k}", clock_offset_s=11.0, correction=Correction(4, 1, 3 + more)) for k in range(1 + more)]
+        parts = READY | {"store": PartHealth(status="degraded", detail=f"{more} entries wait")}
+        health = Health(status="degraded", parts=parts)
+        found = checkup(health=health, vitals=vitals, robots=robots, pages=250 + more)
+        return [each["key"] for each in told(found)["attention"]]
+
+    assert keys(0) == keys(3)
+    assert len(set(keys(0))) == 7
 
 
 def test_clocks_that_are_off_are_told_with_their_robots_and_small_offsets_are_not() -> None:
@@ -238,5 +266,5 @@ def test_workers_that_work_elsewhere_than_they_should_say_why() -> None:
     crew = CrewStatus("dask", 8, warm=False, fallback="no scheduler", shipped_bytes=3_000_000, shipped_again=1)
     facts = dict(told(checkup(vitals=replace(checkup().vitals, crew=crew)))["facts"])
     assert facts["Workers"] == "8 jobs at a time, dask; still loading compiled code; no scheduler."
-    assert facts["Sent to workers"] == "3 MB of features, 1 times again."
-    assert facts["Database"] == "5 entries given to it, 0 wait, 0 lost."
+    assert facts["Sent to workers"] == "3 MB of features, 1 time again."
+    assert facts["Database"] == "5 entries given to it, 0 waiting, 0 lost."

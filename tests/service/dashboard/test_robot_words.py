@@ -52,6 +52,21 @@ def test_every_status_has_a_sentence(scene: Scene) -> None:
             assert told[0].endswith(".")
 
 
+def test_neighbours_that_are_not_live_are_named_with_their_silence(pages_desk: PagesDesk) -> None:
+    for robot in ("r1", "r2", "r3"):
+        pages_desk.scene.send(robot)
+    pages_desk.scene.settle()
+    assert pages_desk.data("/robots/r1/words")["silent"] == {}
+    pages_desk.scene.wait(20)
+    pages_desk.scene.send_pose("r1", pose())
+    pages_desk.scene.send_pose("r3", pose())
+    pages_desk.scene.settle()
+    silent = pages_desk.data("/robots/r1/words")["silent"]
+    beside = {robot["id"]: robot for robot in pages_desk.data("/pair?a=r1&b=r2")["robots"]}
+    assert silent == {"r2": {"status": "stale", "silent_s": beside["r2"]["silent_s"]}}
+    assert silent["r2"]["silent_s"] >= 20
+
+
 @pytest.mark.parametrize(
     ("offset_s", "words"),
     [

@@ -1,61 +1,28 @@
 // How the station is, in plain words: what needs somebody first, then what it drops and why, what waits, and how fast it is.
-import { computed, ref, shallowRef } from "vue";
-import { asked, data, page, root } from "covista/ask.js";
-import { countsNow, headline, needsNow, rounded } from "covista/health_needs.js";
-import { pulse } from "covista/pulse.js";
-import { Samples } from "covista/samples.js";
+import { computed } from "vue";
+import { page, root } from "covista/ask.js";
+import { useHealth } from "covista/health_answers.js";
+import { countsNow, headline, moodOf, needsNow, rounded } from "covista/health_needs.js";
+import { fatesNow, latencyNow, waitingNow } from "covista/health_numbers.js";
 import SparkLine from "covista/spark_line.js";
 
-const EVERY_MS = 2000;
-const FATES = [
-  ["received", "came"], ["used", "used"], ["replaced", "overtaken by newer"], ["duplicate", "came twice"],
-  ["dropped", "dropped"], ["waiting", "undecided"], ["missing", "never came"],
-];
 const LEVELS = { bad: "Wrong", warn: "Look", note: "Note" };
 
 export default {
   components: { SparkLine },
   setup() {
-    const now = shallowRef(null);
-    const trouble = ref("");
-    const at = ref("");
-    const samples = new Samples();
-    pulse(async () => {
-      const answer = await asked(data("/health"));
-      samples.take(answer, performance.now());
-      at.value = new Date().toLocaleTimeString();
-      now.value = answer;
-    }, EVERY_MS, (error) => (trouble.value = error ? `No answer: ${error.message}.` : ""));
-
-    // All of these look at the samples, which are new with each answer.
-    const counts = computed(() => (now.value ? countsNow(now.value, samples) : []));
+    const { now, at, trouble, samples } = useHealth();
+    // All of these look at the samples, which are new with each answer; the template asks for none before the first.
+    const counts = computed(() => countsNow(now.value, samples));
     const happened = computed(() => counts.value.filter(({ total }) => total > 0));
-    const needs = computed(() => (now.value ? needsNow(now.value, counts.value, samples) : []));
-    const line = computed(() => headline(now.value, needs.value));
-    const mood = computed(() => {
-      const levels = needs.value.map(({ level }) => level);
-      return levels.includes("bad") || now.value.status === "stopping" ? "bad" : levels.includes("warn") || now.value.status !== "ready" ? "warn" : "good";
-    });
-    const fates = computed(() => FATES.map(([fate, title]) => ({
-      fate,
-      title,
-      cells: (now.value?.fates ?? []).map((account) => {
-        const read = (answer) => answer.fates.find(({ topic }) => topic === account.topic)?.[fate];
-        return { topic: account.topic, total: account[fate], rate: samples.rate(read) };
-      }),
-    })));
-    const waiting = computed(() => (now.value?.waiting ?? []).map((each) => ({
-      ...each, past: samples.values((answer) => answer.waiting.find(({ key }) => key === each.key)?.value),
-    })));
-    const latency = computed(() => {
-      const [sum, count] = [(answer) => answer.latency.sum_s, (answer) => answer.latency.count];
-      const mean = samples.ratio(sum, count);
-      const past = samples.ratios(sum, count).map((value) => (value === null ? null : 1000 * value));
-      const known = past.filter((value) => value !== null);
-      return { ...now.value.latency, mean_ms: mean === null ? null : 1000 * mean, past, highest: known.length ? Math.max(...known) : null };
-    });
+    const needs = computed(() => needsNow(now.value, counts.value, samples));
+    const line = computed(() => headline(now.value, needs.value, samples));
+    const mood = computed(() => moodOf(now.value, needs.value));
+    const fates = computed(() => fatesNow(now.value, samples));
+    const waiting = computed(() => waitingNow(now.value, samples));
+    const latency = computed(() => latencyNow(now.value, samples));
     const ms = (value) => (value === null ? "not known yet" : `${Math.round(value)} ms`);
-    return { now, trouble, at, needs, line, mood, fates, happened, waiting, latency, ms, rounded, page, root, FATES, LEVELS };
+    return { now, trouble, at, needs, line, mood, fates, happened, waiting, latency, ms, rounded, page, root, LEVELS };
   },
   template: `
     <p v-if="!now" :class="trouble ? 'cv-problem' : 'cv-soft'" role="status">{{ trouble || "Asking the station." }}</p>
@@ -64,7 +31,7 @@ export default {
         <h2 id="cv-line" class="cv-headline" aria-live="polite">{{ line }}</h2>
         <p class="cv-soft">{{ now.robots }} As of {{ at }}.</p>
         <ul v-if="needs.length" class="cv-needs">
-          <li v-for="need in needs" :key="need.says" :class="'cv-need-' + need.level"><b>{{ LEVELS[need.level] }}</b>
+          <li v-for="need in needs" :key="need.key" :class="'cv-need-' + need.level"><b>{{ LEVELS[need.level] }}</b>
             <span>{{ need.says }} <i>{{ need.todo }}</i>
               <span v-if="need.robots.length"> Most concerned: <template v-for="(robot, k) in need.robots" :key="robot">{{ k ? ", " : "" }}<a :href="page('/robots/' + robot)">{{ robot }}</a></template>.</span></span></li>
         </ul>

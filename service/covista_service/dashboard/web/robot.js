@@ -1,106 +1,35 @@
 // One robot: what it sees, with whom it shares that, and what becomes of what it sends.
-import { computed, reactive, ref, shallowRef } from "vue";
-import { asked, data, heardOf, page, rest } from "covista/ask.js";
-import EventList, { KINDS } from "covista/event_list.js";
+import { computed } from "vue";
+import { data, page } from "covista/ask.js";
+import EventList from "covista/event_list.js";
 import GroupMark from "covista/group_mark.js";
 import { msOf, spoken } from "covista/moments.js";
 import Neighbours from "covista/neighbours.js";
-import { newestEvents } from "covista/past_asking.js";
-import { pulse } from "covista/pulse.js";
+import { isId } from "covista/pair_facts.js";
 import RobotAccounts from "covista/robot_accounts.js";
-import { Samples } from "covista/samples.js";
-
-const [EVERY_MS, EVENTS_MS, FORGOTTEN_MS, SOON_MS] = [1000, 5000, 5000, 100];
-const WEEK_MS = 604800000;
-const MOST_EVENTS = 100;
-const IS_ID = /^[a-z0-9][a-z0-9_-]{0,62}$/;
-// Less in common is none to speak of.
-const LEAST = 0.01;
-const GROUPED = ["join", "moved", "split", "merge"];
-const SHOWN = KINDS.filter((each) => each.name !== "Settings");
+import { SHOWN, useRobotEvents } from "covista/robot_events.js";
+import { cameraWords, placeWords } from "covista/robot_facts.js";
+import { useRobotReport } from "covista/robot_report.js";
 
 export default {
   components: { EventList, GroupMark, Neighbours, RobotAccounts },
   props: { robot: { type: String, required: true } },
   setup(props) {
     document.title = `${props.robot} - Covista`;
-    const valid = IS_ID.test(props.robot);
-    const [words, report, pairs] = [shallowRef(null), shallowRef(null), shallowRef(null)];
-    const [problem, unread] = [ref(""), ref("")];
-    const rates = reactive({ keyframes: null, poses: null, missing: null });
-    const counted = new Samples();
-    const aheadMs = ref(0);
+    const valid = isId(props.robot);
+    const told = useRobotReport(props.robot, valid);
+    const past = useRobotEvents(props.robot, valid, told);
+    const { words, report } = told;
 
-    async function look() {
-      const found = await asked(data(`/robots/${props.robot}/words`));
-      heardOf(found.station);
-      words.value = found;
-      // By the station's clock.
-      aheadMs.value = msOf(found.time) - Date.now();
-      if (!found.known) {
-        report.value = pairs.value = null;
-        return;
-      }
-      [report.value, { pairs: pairs.value }] = await Promise.all([
-        asked(rest(`/robots/${props.robot}`)),
-        asked(rest(`/pairs?robot=${props.robot}&min_overlap=${LEAST}`)),
-      ]);
-      const { keyframes, poses } = report.value;
-      const sent = { keyframes: keyframes.received, poses: poses.received, missing: keyframes.missing + poses.missing };
-      counted.take({ station: found.station, ...sent }, performance.now());
-      for (const name of Object.keys(rates)) {
-        const aMinute = counted.rate((answer) => answer[name]);
-        rates[name] = aMinute === null ? null : aMinute / 60;
-      }
-    }
-
-    const events = shallowRef(null);
-    const chosen = ref(["Robots", "Warnings"]);
-    let askedUntil = null;
-    async function recall() {
-      if (!words.value) return;
-      const now = Date.now() + aheadMs.value;
-      const since = askedUntil === null ? now - WEEK_MS : askedUntil - 5000;
-      const which = { kinds: SHOWN.flatMap((each) => each.kinds), robot: props.robot };
-      const found = await newestEvents(since, now + 1000, which, MOST_EVENTS);
-      const known = events.value?.items ?? [];
-      const seen = new Set(known.map((event) => event.id));
-      const items = [...known, ...found.items.filter((event) => !seen.has(event.id))].slice(-MOST_EVENTS);
-      events.value = { items, reachesMs: askedUntil === null ? found.reachesMs : events.value.reachesMs };
-      askedUntil = now;
-    }
-    if (valid) {
-      pulse(look, () => (words.value?.known === false ? FORGOTTEN_MS : EVERY_MS), (error) => (problem.value = error ? error.message : ""));
-      pulse(recall, () => (words.value ? EVENTS_MS : SOON_MS), (error) => (unread.value = error ? error.message : ""));
-    }
-
-    const shown = computed(() => {
-      const kinds = SHOWN.filter((each) => chosen.value.includes(each.name)).flatMap((each) => each.kinds);
-      return { ...events.value, items: (events.value?.items ?? []).filter((event) => kinds.includes(event.event)) };
-    });
-    const grouped = computed(() => {
-      const group = report.value?.group;
-      return group ? events.value?.items.findLast((event) => GROUPED.includes(event.event) && event.labels.includes(group)) : undefined;
-    });
-    const linkOf = (time) => page(`/timeline?time=${encodeURIComponent(time)}`);
-    const camera = computed(() => {
-      const told = report.value?.camera;
-      if (!told) return "It has told none yet.";
-      const degrees = (px, f) => Math.round((360 / Math.PI) * Math.atan(px / 2 / f));
-      const lens = { none: "no distortion", plumb_bob: "a plumb-bob lens", equidistant: "a fisheye lens" }[told.distortion.model];
-      return `${told.width} x ${told.height} pixels, some ${degrees(told.width, told.fx)} x ${degrees(told.height, told.fy)} degrees, ${lens}.`;
-    });
-    const place = computed(() => {
-      const at = report.value?.pose?.position_m;
-      return at ? `x ${at[0].toFixed(2)} m, y ${at[1].toFixed(2)} m, z ${at[2].toFixed(2)} m` : "not told yet";
-    });
     const shows = computed(() => Boolean(words.value?.known && report.value));
+    const camera = computed(() => cameraWords(report.value?.camera));
+    const place = computed(() => placeWords(report.value?.pose));
     const picture = computed(() => {
       const key = words.value?.picture?.key;
       return key ? data(`/robots/${props.robot}/view.png?keyframe=${encodeURIComponent(key)}`) : null;
     });
-    const sinceMs = computed(() => Date.now() + aheadMs.value - WEEK_MS);
-    return { shows, valid, words, report, pairs, problem, unread, rates, events, shown, chosen, SHOWN, grouped, linkOf, camera, place, picture, sinceMs, page, msOf, spoken };
+    const linkOf = (time) => page(`/timeline?time=${encodeURIComponent(time)}`);
+    return { ...told, ...past, valid, shows, camera, place, picture, linkOf, SHOWN, page, msOf, spoken };
   },
   template: `
     <div class="cv-robot-page">
@@ -112,7 +41,7 @@ export default {
         for so long that it is forgotten. When it sends something, it is shown here. <a :href="page('/')">The swarm</a></p>
       <section v-if="shows" class="cv-card cv-robot-head" :class="'cv-is-' + report.status" aria-labelledby="cv-robot-id">
         <h2 id="cv-robot-id">{{ robot }} <group-mark :label="report.group"></group-mark></h2>
-        <p v-for="sentence in words.standing" :key="sentence">{{ sentence }}</p>
+        <p v-for="(sentence, k) in words.standing" :key="k">{{ sentence }}</p>
         <p v-if="grouped">It came to {{ report.group }} at <a :href="linkOf(grouped.time)">{{ spoken(msOf(grouped.time)) }}</a>: {{ grouped.text }}.</p>
       </section>
       <div :class="{ 'cv-robot-columns': shows }">
@@ -127,7 +56,7 @@ export default {
           <robot-accounts :report="report" :dropped="words.dropped" :rates="rates"></robot-accounts>
         </div>
         <div>
-          <neighbours v-if="shows" :robot="robot" :pairs="pairs"></neighbours>
+          <neighbours v-if="shows" :robot="robot" :pairs="pairs" :silent="words.silent"></neighbours>
           <section v-if="shows" class="cv-card" aria-labelledby="cv-about">
             <h2 id="cv-about">Clock, pose, camera</h2>
             <dl class="cv-facts">

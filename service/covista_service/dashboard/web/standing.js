@@ -2,6 +2,7 @@
 import { computed, onMounted, onUnmounted, ref, watch } from "vue";
 import { asked, data, heardOf, noteRestart, page, root, standing } from "covista/ask.js";
 import { onDark } from "covista/dark.js";
+import { clock } from "covista/moments.js";
 import { pulse } from "covista/pulse.js";
 
 const DARK = "covista-dark";
@@ -41,9 +42,9 @@ export default {
     const words = computed(() => {
       if (standing.loggedOut) return "You are not logged in any more: you have logged out, your token is revoked, or the station has restarted.";
       if (standing.lostSince !== null) {
-        return `The station has not answered since ${new Date(standing.lostSince).toLocaleTimeString()}. What you see is from before; trying again.`;
+        return `The station has not answered since ${clock(standing.lostSince)}. What you see is from before; trying again.`;
       }
-      const restarted = standing.restartedAt ? `The station has restarted; connected again at ${standing.restartedAt.toLocaleTimeString()}. ` : "";
+      const restarted = standing.restartedAt ? `The station has restarted; connected again at ${clock(standing.restartedAt)}. ` : "";
       const [trouble] = standing.troubles.values();
       return restarted + (trouble ? `Part of this page may be from before: ${trouble}. Trying again.` : "");
     });

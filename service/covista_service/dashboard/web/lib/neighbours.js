@@ -5,22 +5,25 @@ import { ago, byName, percent } from "covista/looks.js";
 
 const HOW = { image: "found in images", predicted: "predicted", decayed: "from before", unknown: "not known" };
 const MOST = 50;
+const silence = ({ status, silent_s }) => (silent_s === null ? status : `${status}, silent for ${ago(silent_s)}`);
 
 export default {
-  props: { robot: { type: String, required: true }, pairs: { type: Array, default: null } },
+  // `silent`: { name: { status, silent_s } } of those that are not live.
+  props: { robot: { type: String, required: true }, pairs: { type: Array, default: null }, silent: { type: Object, default: () => ({}) } },
   setup(props) {
     const all = computed(() =>
       (props.pairs ?? [])
         .map((pair) => {
           const first = pair.a === props.robot;
           const [own, theirs] = first ? [pair.overlap_a, pair.overlap_b] : [pair.overlap_b, pair.overlap_a];
-          return { name: first ? pair.b : pair.a, own, theirs, how: HOW[pair.found_by], ageS: pair.age_s };
+          const name = first ? pair.b : pair.a;
+          return { name, silent: props.silent[name], own, theirs, how: HOW[pair.found_by], ageS: pair.age_s };
         })
         .sort((p, q) => Math.max(q.own ?? 0, q.theirs ?? 0) - Math.max(p.own ?? 0, p.theirs ?? 0) || byName(p.name, q.name)),
     );
     const shown = computed(() => all.value.slice(0, MOST));
     const predicted = computed(() => shown.value.some((each) => each.how === HOW.predicted));
-    return { all, shown, predicted, page, ago, percent };
+    return { all, shown, predicted, silence, page, ago, percent };
   },
   template: `
     <section class="cv-card" aria-labelledby="cv-neighbours">
@@ -32,7 +35,8 @@ export default {
           <thead><tr><th scope="col">Robot</th><th scope="col" class="cv-number">sees of {{ robot }}'s view</th>
             <th scope="col" class="cv-number">{{ robot }} sees of its view</th><th scope="col">How that is known</th></tr></thead>
           <tbody><tr v-for="each in shown" :key="each.name">
-            <th scope="row"><a :href="page('/robots/' + each.name)">{{ each.name }}</a></th>
+            <th scope="row"><a :href="page('/robots/' + each.name)">{{ each.name }}</a>
+              <span v-if="each.silent" class="cv-silent">{{ silence(each.silent) }}</span></th>
             <td class="cv-number"><span class="cv-share" aria-hidden="true"><i :style="{ width: 100 * (each.own ?? 0) + '%' }"></i></span> {{ percent(each.own) }}</td>
             <td class="cv-number"><span class="cv-share" aria-hidden="true"><i :style="{ width: 100 * (each.theirs ?? 0) + '%' }"></i></span> {{ percent(each.theirs) }}</td>
             <td><a :href="page('/pairs/' + robot + '/' + each.name)" :aria-label="'What ' + robot + ' and ' + each.name + ' both see'">{{ each.how }}</a><template v-if="each.ageS >= 1">, {{ ago(each.ageS) }} ago</template></td>

@@ -15,17 +15,29 @@ export class Samples {
     this.all = [...this.all.filter(({ at }) => atMs - at < KEPT_MS), { at: atMs, answer }];
   }
 
-  // A minute, or as much of one as was watched, of what `read` finds in an answer; null before there are two answers.
-  rate(read) {
+  // What of the samples is looked at: the last minute, or as much of one as was watched; null before there are two.
+  watched() {
     const last = this.all.at(-1);
     const first = this.all.find(({ at }) => last.at - at <= RATE_MS);
-    if (!last || first === last) return null;
-    return (Math.max(0, (read(last.answer) ?? 0) - (read(first.answer) ?? 0)) * 60000) / (last.at - first.at);
+    return first === last ? null : { first: first.answer, last: last.answer, ms: last.at - first.at };
   }
 
-  // How much more of `what` for each of `of` in that time; null where there was none.
+  // Whether so much was watched that something can be said of how often things happen.
+  spans(leastMs) {
+    const watched = this.watched();
+    return watched !== null && watched.ms >= leastMs;
+  }
+
+  // How much a minute comes of what `read` finds in an answer; null before `leastMs` were watched.
+  rate(read, leastMs) {
+    if (!this.spans(leastMs)) return null;
+    const { first, last, ms } = this.watched();
+    return (Math.max(0, (read(last) ?? 0) - (read(first) ?? 0)) * 60000) / ms;
+  }
+
+  // How much more of `what` for each of `of` in that time, however short it is; null where there was none.
   ratio(what, of) {
-    const [more, each] = [this.rate(what), this.rate(of)];
+    const [more, each] = [this.rate(what, 0), this.rate(of, 0)];
     return each ? more / each : null;
   }
 
