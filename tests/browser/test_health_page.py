@@ -11,6 +11,8 @@ import pytest
 if TYPE_CHECKING:
     from playwright.sync_api import Locator, Page, Route
 
+    from tests.browser.visitor import Visitor
+
 expect = pytest.importorskip("playwright.sync_api").expect
 
 # Rates are judged after 20 s of answers.
@@ -249,6 +251,16 @@ def test_before_the_first_keyframe_no_latency_is_made_up(page: Page, station: Pl
     opened(page)
     page.get_by_text("No keyframe has shown in the groups yet.").wait_for()
     assert " ms" not in page.locator("section[aria-labelledby=cv-latency]").inner_text()
+
+
+def test_what_is_shown_when_no_answer_comes_any_more_is_said_to_be_old(visitor: Visitor, station: Place) -> None:
+    visitor.allow("503")
+    page = opened(visitor.page())
+    page.route(HEALTH, lambda route: route.fulfill(status=503, json={"detail": "the station is busy"}))
+    expect(page.get_by_role("alert")).to_contain_text("What you see is from before")
+    expect(page.get_by_role("alert")).to_contain_text("the station is busy")
+    page.unroute(HEALTH)
+    expect(page.get_by_role("alert")).to_have_count(0)
 
 
 def test_all_numbers_are_a_link_away(page: Page, station: Place) -> None:

@@ -27,6 +27,7 @@ export default {
   template: `
     <p v-if="!now" :class="trouble ? 'cv-problem' : 'cv-soft'" role="status">{{ trouble || "Asking the station." }}</p>
     <div v-else class="cv-health">
+      <p v-if="trouble" class="cv-problem cv-wide" role="alert">What you see is from before. {{ trouble }} Trying again.</p>
       <section class="cv-card cv-wide" :class="'cv-mood-' + mood" aria-labelledby="cv-line">
         <h2 id="cv-line" class="cv-headline" aria-live="polite">{{ line }}</h2>
         <p class="cv-soft">{{ now.robots }} As of {{ at }}.</p>

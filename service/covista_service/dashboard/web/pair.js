@@ -1,7 +1,7 @@
 // Two robots: both keyframes with the common field, what is known of it, the planes behind it, and how it was before.
 import { computed, ref } from "vue";
 import { page } from "covista/ask.js";
-import { ago, percent } from "covista/looks.js";
+import { ago, percent, silence } from "covista/looks.js";
 import { isId, usePairFacts } from "covista/pair_facts.js";
 import { usePairLook } from "covista/pair_look.js";
 import { usePartners } from "covista/pair_partners.js";
@@ -63,7 +63,7 @@ export default {
         return { side, name, other, keyframe, robot: facts.value?.robots[k], picture: look.value?.pictures[k] };
       }),
     );
-    return { ...usePartners(props.a, props.b), facts, problem, aheadMs, wrong, wanted, look, moment, none, ofBefore, sides, page, ago };
+    return { ...usePartners(props.a, props.b), facts, problem, aheadMs, wrong, wanted, look, moment, none, ofBefore, sides, page, silence };
   },
   template: `
     <div class="cv-pair">
@@ -84,7 +84,7 @@ export default {
             :words="'The keyframe of ' + each.name + '; what ' + each.other + ' sees of it is bright, the rest dimmed'">
             <strong><a :href="page('/robots/' + each.name)">{{ each.name }}</a></strong>
             <group-mark v-if="each.robot" :label="each.robot.group"></group-mark>
-            <span v-if="each.robot && each.robot.status !== 'live'" class="cv-alarm">{{ each.robot.status }}, silent for {{ ago(each.robot.silent_s) }}</span>
+            <span v-if="each.robot && each.robot.status !== 'live'" class="cv-alarm">{{ silence(each.robot.status, each.robot.silent_s) }}</span>
             <span v-if="each.keyframe" class="cv-soft">keyframe {{ each.keyframe.sequence }} <span :title="'boot ' + each.keyframe.boot">of boot {{ each.keyframe.boot.slice(0, 8) }}</span></span>
           </pair-picture>
         </div>

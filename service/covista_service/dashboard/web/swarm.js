@@ -1,7 +1,7 @@
 // The swarm in one look: the map, the groups, and why two robots are apart or together.
 import { computed, ref, watch } from "vue";
 import { asked, data, page } from "covista/ask.js";
-import { ago, byLabel, byName, percent, REASONS } from "covista/looks.js";
+import { ago, byLabel, byName, REASONS, silence } from "covista/looks.js";
 import { pulse } from "covista/pulse.js";
 import { useSwarm } from "covista/swarm_frames.js";
 import GroupMark from "covista/group_mark.js";
@@ -49,7 +49,7 @@ export default {
       const { a, b } = pair.value;
       why.value = a && b ? await asked(data(`/why?a=${a}&b=${b}`)) : null;
     }, WHY_MS);
-    return { frame, robots, groups, missing, quiet, names, chosen, choose, pair, pick, why, ask, page, ago, percent, REASONS };
+    return { frame, robots, groups, missing, quiet, names, chosen, choose, pair, pick, why, ask, page, ago, silence, REASONS };
   },
   watch: {
     pair() {
@@ -81,12 +81,12 @@ export default {
             <li v-for="robot in missing" :key="robot.id">
               <button class="cv-robot" :class="'cv-' + robot.status" :aria-pressed="chosen.includes(robot.id)"
                 @click="choose(robot.id)">{{ robot.id }}</button>
-              <span>{{ REASONS[robot.reason] ?? 'is in no group yet' }}; last heard {{ ago(robot.silentS) }} ago</span>
+              <span>{{ REASONS[robot.reason] ?? 'is in no group yet' }}; {{ robot.silentS === null ? 'never heard' : 'last heard ' + ago(robot.silentS) + ' ago' }}</span>
             </li>
             <li v-for="robot in quiet" :key="robot.id">
               <button class="cv-robot" :class="'cv-' + robot.status" :aria-pressed="chosen.includes(robot.id)"
                 @click="choose(robot.id)">{{ robot.id }}</button>
-              <span>{{ robot.status }}: silent for {{ ago(robot.silentS) }}, still in {{ robot.group }}</span>
+              <span>{{ silence(robot.status, robot.silentS) }}, still in {{ robot.group }}</span>
             </li>
           </ul>
         </section>
@@ -99,7 +99,7 @@ export default {
               <option v-for="name in names" :key="name">{{ name }}</option></select></label>
           </p>
           <p v-if="why?.problem">The station says: {{ why.problem }}.</p>
-          <p v-for="sentence in why?.sentences" :key="sentence">{{ sentence }}</p>
+          <p v-for="(sentence, k) in why?.sentences" :key="k">{{ sentence }}</p>
           <p class="cv-note">Similarity is 1 for robots that see the same from the same place, and 0 for those that share nothing and
             stand far apart.</p>
           <p><a :href="page('/pairs/' + pair.a + '/' + pair.b)">What both see</a>,

@@ -49,6 +49,9 @@ export const byLabel = (a, b) => numberOf(a) - numberOf(b) || (a < b ? -1 : 1);
 export const byName = (a, b) => a.localeCompare(b, "en", { numeric: true });
 export const percent = (share) => (share === null || share === undefined ? "unknown" : `${Math.round(100 * share)} %`);
 
+// How a robot is that is not live, in words; of one that was never heard `seconds` is null.
+export const silence = (status, seconds) => (seconds === null ? status : `${status}, silent for ${ago(seconds)}`);
+
 export function ago(seconds) {
   if (seconds === null || seconds === undefined) return "never";
   if (seconds < 90) return `${Math.round(seconds)} s`;

@@ -1,11 +1,10 @@
 // With whom a robot shares its view, the most first.
 import { computed } from "vue";
 import { page } from "covista/ask.js";
-import { ago, byName, percent } from "covista/looks.js";
+import { ago, byName, percent, silence } from "covista/looks.js";
 
 const HOW = { image: "found in images", predicted: "predicted", decayed: "from before", unknown: "not known" };
 const MOST = 50;
-const silence = ({ status, silent_s }) => (silent_s === null ? status : `${status}, silent for ${ago(silent_s)}`);
 
 export default {
   // `silent`: { name: { status, silent_s } } of those that are not live.
@@ -36,7 +35,7 @@ export default {
             <th scope="col" class="cv-number">{{ robot }} sees of its view</th><th scope="col">How that is known</th></tr></thead>
           <tbody><tr v-for="each in shown" :key="each.name">
             <th scope="row"><a :href="page('/robots/' + each.name)">{{ each.name }}</a>
-              <span v-if="each.silent" class="cv-silent">{{ silence(each.silent) }}</span></th>
+              <span v-if="each.silent" class="cv-silent">{{ silence(each.silent.status, each.silent.silent_s) }}</span></th>
             <td class="cv-number"><span class="cv-share" aria-hidden="true"><i :style="{ width: 100 * (each.own ?? 0) + '%' }"></i></span> {{ percent(each.own) }}</td>
             <td class="cv-number"><span class="cv-share" aria-hidden="true"><i :style="{ width: 100 * (each.theirs ?? 0) + '%' }"></i></span> {{ percent(each.theirs) }}</td>
             <td><a :href="page('/pairs/' + robot + '/' + each.name)" :aria-label="'What ' + robot + ' and ' + each.name + ' both see'">{{ each.how }}</a><template v-if="each.ageS >= 1">, {{ ago(each.ageS) }} ago</template></td>
