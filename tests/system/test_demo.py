@@ -137,6 +137,12 @@ def test_a_taken_port_is_one_line_that_names_the_flag(tmp_path: Path, flag: str)
             assert demo.process.wait(START_S) == 1
 
 
+def test_rovers_go_to_the_first_of_several_end_points(tmp_path: Path) -> None:
+    ends = ", ".join(f"tcp/127.0.0.1:{free_port()}" for _ in range(2))
+    with started(tmp_path, "--seconds", "1", COVISTA_LINK=ends) as demo:
+        assert demo.process.wait(START_S) == 0
+
+
 def test_the_environment_says_where_too(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         address = f"127.0.0.1:{taken.getsockname()[1]}"

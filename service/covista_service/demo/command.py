@@ -55,7 +55,7 @@ def demo(
             database = f"sqlite:///{folder}/covista.db"
         try:
             settings = config.load({"api": api, "link": link, "database": database, "log_level": "warning"})
-            swarm = SwarmOptions(robots=robots, world=world, seed=seed, connect=link, site=settings.site)
+            swarm = SwarmOptions(robots=robots, world=world, seed=seed, connect=settings.link[0], site=settings.site)
             result = run(DemoOptions(swarm, settings, seconds, report is not None), stack.enter_context(_screen()))
         except CovistaError as error:
             typer.echo(str(error), err=True)
