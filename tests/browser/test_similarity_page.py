@@ -84,6 +84,21 @@ def last_cell(page: Page) -> Any:
     return {"x": box["width"] - 8, "y": box["height"] - 8}
 
 
+def test_who_leaves_at_once_finds_the_last_choice_on_the_way_back(page: Page) -> None:
+    opened(page, "?a=r1&b=r1")
+    page.locator(MATRIX).focus()
+    # Faster than addresses are written.
+    page.evaluate(
+        """selector => { for (const key of ["Home", "ArrowRight", "ArrowRight", "ArrowRight", "Enter"])
+        document.querySelector(selector).dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true })); }""",
+        MATRIX,
+    )
+    page.wait_for_url("**/pairs/*/*")
+    pair = page.url.rsplit("/", 2)[1:]
+    page.go_back()
+    expect(page.locator(PAIR)).to_contain_text(" and ".join(pair))
+
+
 def test_another_matrix_has_its_own_numbers_and_its_own_address(page: Page) -> None:
     opened(page, "?a=r1&b=r2").get_by_text("distance", exact=True).click()
     expect(page.locator(PAIR)).to_contain_text(" m")

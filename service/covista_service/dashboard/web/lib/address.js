@@ -1,7 +1,7 @@
 // What is chosen on a page, in its address: so that it can be sent to somebody.
 
-// Browsers take some two hundred addresses in half a minute, and who drags a slider makes more.
-const LEAST_MS = 200;
+// Browsers take some one or two hundred addresses in half a minute, and who drags a slider makes more.
+const LEAST_MS = 350;
 
 let [timer, waiting] = [null, null];
 
@@ -19,8 +19,15 @@ export function write(url) {
 }
 
 function settle() {
-  if (waiting !== null && new URL(waiting, location.href).href !== location.href) history.replaceState(history.state, "", waiting);
+  const wanted = waiting;
   waiting = null;
+  if (wanted === null || new URL(wanted, location.href).href === location.href) return;
+  try {
+    history.replaceState(history.state, "", wanted);
+  } catch {
+    // The browser has had enough for now: with the next round.
+    waiting = wanted;
+  }
 }
 
 // Who leaves finds it again on the way back.
