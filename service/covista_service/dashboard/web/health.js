@@ -17,7 +17,7 @@ export default {
     const happened = computed(() => counts.value.filter(({ total }) => total > 0));
     const needs = computed(() => needsNow(now.value, counts.value, samples));
     const line = computed(() => headline(now.value, needs.value, samples));
-    const mood = computed(() => moodOf(now.value, needs.value));
+    const mood = computed(() => moodOf(now.value, needs.value, samples));
     const fates = computed(() => fatesNow(now.value, samples));
     const waiting = computed(() => waitingNow(now.value, samples));
     const latency = computed(() => latencyNow(now.value, samples));
@@ -25,9 +25,9 @@ export default {
     return { now, trouble, at, needs, line, mood, fates, happened, waiting, latency, ms, rounded, page, root, LEVELS };
   },
   template: `
-    <p v-if="!now" :class="trouble ? 'cv-problem' : 'cv-soft'" role="status">{{ trouble || "Asking the station." }}</p>
+    <p v-if="!now" :class="trouble ? 'cv-problem' : 'cv-soft'" role="status">{{ trouble ? "No answer: " + trouble : "Asking the station." }}</p>
     <div v-else class="cv-health">
-      <p v-if="trouble" class="cv-problem cv-wide" role="alert">What you see is from before. {{ trouble }} Trying again.</p>
+      <p v-if="trouble" class="cv-problem cv-wide" role="alert">What you see is from before: {{ trouble }} Trying again.</p>
       <section class="cv-card cv-wide" :class="'cv-mood-' + mood" aria-labelledby="cv-line">
         <h2 id="cv-line" class="cv-headline" aria-live="polite">{{ line }}</h2>
         <p class="cv-soft">{{ now.robots }} As of {{ at }}.</p>
@@ -48,7 +48,7 @@ export default {
         <h2 id="cv-latency">From a keyframe to groups</h2>
         <p v-if="!latency.count">No keyframe has shown in the groups yet.</p>
         <template v-else>
-          <p v-if="latency.mean_ms === null" class="cv-big"><small>No keyframe in the last minute</small></p>
+          <p v-if="latency.mean_ms === null" class="cv-big"><small>{{ latency.judged ? "No keyframe in the last minute" : "Not known yet" }}</small></p>
           <p v-else class="cv-big">{{ ms(latency.mean_ms) }} <small>on average in the last minute</small></p>
           <spark-line :values="latency.past" name="Latency" unit="ms" wide></spark-line>
           <p class="cv-soft">Since this page was opened, the last five minutes at most<template v-if="latency.highest !== null">; highest {{ ms(latency.highest) }}</template>.</p>

@@ -1,6 +1,6 @@
 // How the station is, asked for again and again while the page is looked at.
 import { ref, shallowRef } from "vue";
-import { asked, data } from "covista/ask.js";
+import { asked, data, Lost } from "covista/ask.js";
 import { clock } from "covista/moments.js";
 import { pulse } from "covista/pulse.js";
 import { Samples } from "covista/samples.js";
@@ -20,6 +20,9 @@ export function useHealth() {
     at.value = clock(Date.now());
     // Last: what looks at the samples does so when this changes.
     now.value = answer;
-  }, EVERY_MS, (error) => (trouble.value = error ? `No answer: ${error.message}.` : ""));
+  }, EVERY_MS, (error) => {
+    // Once something is shown, the top of the page says that no answer comes.
+    trouble.value = !error || (now.value && error instanceof Lost) ? "" : `${error.message}.`;
+  });
   return { now, at, trouble, samples };
 }

@@ -8,7 +8,7 @@ const ORDER = { bad: 0, warn: 1, note: 2 };
 
 export const rounded = (rate) => (rate === null ? "..." : rate > 0 && rate < 10 ? rate.toFixed(1) : `${Math.round(rate)}`);
 
-export const totalOf = (key) => (answer) => answer.counts.find((each) => each.key === key)?.total;
+const totalOf = (key) => (answer) => answer.counts.find((each) => each.key === key)?.total;
 
 // Counts with how many a minute come now, those that need somebody first, then those with most; not by rates, for rows
 // that change places with each answer cannot be read, and lose who stands on a link in them.
@@ -60,8 +60,10 @@ export function headline(answer, needs, samples) {
   return "All is well: every part of the station works, and nothing is being dropped.";
 }
 
-export function moodOf(answer, needs) {
+// By what colour it is said; "open" as long as not all is known.
+export function moodOf(answer, needs, samples) {
   const levels = needs.map(({ level }) => level);
   if (levels.includes("bad") || answer.status === "stopping") return "bad";
-  return levels.includes("warn") || answer.status !== "ready" ? "warn" : "good";
+  if (levels.includes("warn") || answer.status !== "ready") return "warn";
+  return samples.spans(LEAST_MS) ? "good" : "open";
 }

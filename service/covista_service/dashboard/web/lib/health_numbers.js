@@ -26,5 +26,5 @@ export function latencyNow(answer, samples) {
   const mean = samples.ratio(sum, count);
   const past = samples.ratios(sum, count).map((value) => (value === null ? null : 1000 * value));
   const known = past.filter((value) => value !== null);
-  return { ...answer.latency, mean_ms: mean === null ? null : 1000 * mean, past, highest: known.length ? Math.max(...known) : null };
+  return { ...answer.latency, mean_ms: mean === null ? null : 1000 * mean, judged: samples.spans(LEAST_MS), past, highest: known.length ? Math.max(...known) : null };
 }
