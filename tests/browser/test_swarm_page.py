@@ -20,7 +20,11 @@ def still(page: Page) -> Page:
     page.emulate_media(reduced_motion="reduce")
     opened(page, "/dashboard/", "Swarm")
     await_groups(page, 2)
+    canvas = page.locator(".cv-map canvas")
+    before = int(canvas.get_attribute("data-frames") or 0)
     page.get_by_label("Follow").select_option("r1")
+    # It is in the middle once the map is drawn anew.
+    page.wait_for_function("n => document.querySelector('.cv-map canvas').dataset.frames > n", arg=before)
     return page
 
 

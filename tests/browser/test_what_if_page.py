@@ -232,7 +232,7 @@ def test_what_others_have_changed_while_the_page_was_away_is_not_undone(page: Pa
     page.goto("/dashboard/health")
     changed(page, station, alpha=0.9)
     tried(page)
-    said(page, "cannot be undone here any more, for it was changed elsewhere since: alpha is 0.9, was 0.7")
+    said(page, "cannot be undone here any more, for it stands otherwise now: alpha is 0.9, was 0.7")
     assert page.get_by_role("button", name="Undo").count() == 0
     assert settings(page, station) == AS_THEY_ARE | {"alpha": 0.9, "groups": 3}
     page.reload()

@@ -1,7 +1,7 @@
 // Two robots: both keyframes with the common field, what is known of it, the planes behind it, and how it was before.
 import { computed, ref } from "vue";
 import { page } from "covista/ask.js";
-import { ago, percent, silence } from "covista/looks.js";
+import { ago, silence } from "covista/looks.js";
 import { isId, usePairFacts } from "covista/pair_facts.js";
 import { usePairLook } from "covista/pair_look.js";
 import { usePartners } from "covista/pair_partners.js";
@@ -32,15 +32,8 @@ function whyNone(look, facts) {
   if (!look.pair.keyframes) return "None: what both see is not known yet.";
   const why = facts?.why_not;
   if (why) return `None. ${why}`;
-  if (facts?.inliers) return "None in these keyframes: they are newer than the images that were last compared.";
+  if (facts?.inliers) return "None in these keyframes: they were not compared with one another.";
   return "None in these keyframes: nothing was matched in both images yet. The overlap is predicted.";
-}
-
-// Whether what is written in the pictures, which are of keyframes, is other than what is known of where robots stand now.
-function areOfBefore(look, facts) {
-  if (!facts || !look?.pictures.some(({ png }) => png)) return false;
-  const said = ({ overlap_a, overlap_b, found_by }) => `${percent(overlap_a)}, ${percent(overlap_b)}, ${found_by}`;
-  return said(look.pair) !== said(facts);
 }
 
 export default {
@@ -55,7 +48,6 @@ export default {
     const { look, sinceS } = usePairLook(pair, wanted, computed(() => facts.value !== null));
     const moment = computed(() => momentOf(look.value, sinceS.value, wanted.value));
     const none = computed(() => whyNone(look.value, facts.value));
-    const ofBefore = computed(() => areOfBefore(look.value, facts.value));
     const sides = computed(() =>
       ["a", "b"].map((side, k) => {
         const [name, other] = k ? [props.b, props.a] : [props.a, props.b];
@@ -63,7 +55,7 @@ export default {
         return { side, name, other, keyframe, robot: facts.value?.robots[k], picture: look.value?.pictures[k] };
       }),
     );
-    return { ...usePartners(props.a, props.b), facts, problem, aheadMs, wrong, wanted, look, moment, none, ofBefore, sides, page, silence };
+    return { ...usePartners(props.a, props.b), facts, problem, aheadMs, wrong, wanted, look, moment, none, sides, page, silence };
   },
   template: `
     <div class="cv-pair">
@@ -101,7 +93,7 @@ export default {
         <div class="cv-known" v-if="!problem">
           <section class="cv-card" aria-labelledby="cv-facts">
             <h2 id="cv-facts">What is known</h2>
-            <p v-if="ofBefore" class="cv-note">The pictures, and the shares written in them, are of keyframes from before; these are of where the robots stand now.</p>
+            <p class="cv-soft">Of where the robots stand now. Shares written in the pictures are of when those were taken.</p>
             <pair-brief v-if="facts" :facts="facts"></pair-brief>
             <p v-else class="cv-brief">Asking the station.</p>
           </section>

@@ -5,7 +5,6 @@ import { REASONS } from "covista/looks.js";
 import { useGroups, useMatrix } from "covista/matrix_asking.js";
 import { useCell, useShown } from "covista/matrix_shown.js";
 import { usePairFacts } from "covista/pair_facts.js";
-import GroupMark from "covista/group_mark.js";
 import GroupNumber from "covista/group_number.js";
 import MatrixTable from "covista/matrix_table.js";
 import PairBrief from "covista/pair_brief.js";
@@ -15,7 +14,7 @@ import SimilarityMatrix from "covista/similarity_matrix.js";
 const FEW_MISSING = 12;
 
 export default {
-  components: { GroupMark, GroupNumber, MatrixTable, PairBrief, ScaleLegend, SimilarityMatrix },
+  components: { GroupNumber, MatrixTable, PairBrief, ScaleLegend, SimilarityMatrix },
   setup() {
     const groups = useGroups();
     const asking = useMatrix();

@@ -81,7 +81,7 @@ export default {
       <template v-if="bands">
         <p v-if="!bands.robots.length">No groups are kept of this time. Choose a longer one, or go earlier.</p>
         <group-bands :bands="bands" :events="events.items" :time="shown.time" @scrub="scrub"></group-bands>
-        <p class="cv-soft">Times are in {{ zone() }}.{{ otherClock }}
+        <p class="cv-soft">Times are in {{ zone(bands.until_ms) }}.{{ otherClock }}
           <template v-if="bands.thinned">So long a time is thinned: groups are looked at now and then, and short changes between are not drawn. Zoom in to see all.</template></p>
         <ul v-if="bands.gaps.length" class="cv-list"><li v-for="gap in bands.gaps" :key="gap.since_ms + gap.reason">
           <span>Hatched: from {{ spoken(gap.since_ms) }} to {{ spoken(gap.until_ms) }} something is missing: {{ gap.reason }}.</span></li></ul>

@@ -69,7 +69,7 @@ export default {
       <confirm-box :open="applying" title="Apply these settings?" action="Apply" :busy="busy" @confirm="apply" @close="applying = false">
         <ul><li v-for="change in changes" :key="change.name">{{ says(change) }}</li></ul>
         <p v-if="summary">{{ summary }}</p>
-        <p>They hold at once for everybody, and after a restart too. You can undo this here until you close the tab, or somebody else changes them.</p>
+        <p>They hold at once for everybody, and after a restart too. You can undo this here until you close the tab; if somebody else changes them meanwhile, you are asked first.</p>
       </confirm-box>
       <confirm-box :open="undoing" title="Somebody else has changed them since" action="Undo all the same" :busy="busy" @confirm="undo" @close="undoing = false">
         <p>Since you applied yours: {{ overtaken.map(says).join("; ") }}. To undo now means:</p>

@@ -14,7 +14,7 @@ export const overtakenIn = (asking, live) =>
   asking.filter(({ name, value }) => !same(live[name], value)).map(({ name, value }) => ({ name, value: live[name], was: value }));
 
 // Those of what was applied, the newest last, that undoing one after the other would find as they were applied.
-export function undoable(done, live) {
+function undoable(done, live) {
   const found = { ...live };
   const from = done.findLastIndex(({ asking }) => {
     if (overtakenIn(asking, found).length) return true;
@@ -27,7 +27,7 @@ export function undoable(done, live) {
 function wordOf(done, kept, live, station) {
   const { at, asking, start } = done.at(-1);
   if (!kept.length) {
-    return `What was applied here at ${spoken(at)} cannot be undone here any more, for it was changed elsewhere since: ${listed(overtakenIn(asking, live))}.`;
+    return `What was applied here at ${spoken(at)} cannot be undone here any more, for it stands otherwise now: ${listed(overtakenIn(asking, live))}.`;
   }
   return `Applied at ${spoken(at)}${start === station ? "" : ", before the station restarted"}: ${listed(asking)}.`;
 }

@@ -8,6 +8,8 @@ import { contextOf, usePainting } from "covista/painting.js";
 const NEAR_PX = 8;
 const STEPS = 300;
 
+// The slider's data-time is the time that is looked at as the address has it: its value is rounded to its steps.
+
 // The event that is drawn near a place of the scale, the nearest of them; null where none is.
 function nearest(events, scale, x) {
   const apart = (event) => Math.abs(scale.px(event.ms) - x);

@@ -2,15 +2,16 @@
 import { computed } from "vue";
 import { criterionSentence, scoreSentence } from "covista/criteria.js";
 import { bestOf } from "covista/score_best.js";
+import { counted } from "covista/looks.js";
 import ScoreChart from "covista/score_chart.js";
 
 const FEW_NAMES = 12;
 const listed = (names) =>
   names.length > FEW_NAMES ? `${names.slice(0, FEW_NAMES).join(", ")} and ${names.length - FEW_NAMES} more` : names.join(", ");
-const groupsOf = (count) => `${count} ${count === 1 ? "group" : "groups"}`;
+const groupsOf = (count) => counted(count, "group");
 
 // What holds of the number that is shown, in sentences.
-export function reasonsOf(groups) {
+function reasonsOf(groups) {
   const { scores, settings, waiting } = groups;
   const [shown, best] = [groups.groups.length, bestOf(scores)?.groups ?? null];
   const sentences = [];

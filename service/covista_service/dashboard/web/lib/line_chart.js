@@ -8,7 +8,7 @@ const STRIP = 12;
 const TICK_PX = 90;
 
 // The place of the last moment that is not after `ms`; -1 before the first.
-export function placeAt(moments, ms) {
+function placeAt(moments, ms) {
   let [low, high] = [0, moments.length];
   while (low < high) {
     const middle = (low + high) >> 1;

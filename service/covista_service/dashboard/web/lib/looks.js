@@ -3,7 +3,7 @@
 // after Okabe and Ito (2008), told apart by eyes that see fewer, without greys; those for the dark are lighter.
 const LIGHT = ["#0072b2", "#d55e00", "#009e73", "#b0508f", "#8a6d00", "#5a3fb8", "#1f1f1f"];
 const DARK = ["#56b4e9", "#ff8c42", "#2fd0a0", "#e59cc9", "#f0e442", "#b3a1ff", "#f5f5f5"];
-export const SHAPES = ["circle", "square", "triangle", "diamond", "pentagon", "cross"];
+const SHAPES = ["circle", "square", "triangle", "diamond", "pentagon", "cross"];
 const NONE = { light: "#767676", dark: "#9a9a9a" };
 
 export const isDark = () => document.body.classList.contains("body--dark");
@@ -43,6 +43,8 @@ export function trace(context, shape, x, y, r) {
 
 // Why a robot stands in no group now.
 export const REASONS = { no_pose: "has told no pose yet", gone: "is gone" };
+
+export const counted = (count, what) => `${count} ${what}${count === 1 ? "" : "s"}`;
 
 // g2 before g10.
 export const byLabel = (a, b) => numberOf(a) - numberOf(b) || (a < b ? -1 : 1);

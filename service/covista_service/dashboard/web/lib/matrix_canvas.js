@@ -1,7 +1,8 @@
 // Draws a matrix on a canvas as large as there is room for, anew when there is something new to see.
-import { onMounted, onUnmounted, ref, watch } from "vue";
+import { ref, watch } from "vue";
 import { onDark } from "covista/dark.js";
 import { cellUnder, drawChosen, drawMatrix, layoutOf, sideOf } from "covista/matrix_drawing.js";
+import { usePainting } from "covista/painting.js";
 
 const LEAST_PX = 240;
 const BELOW_PX = 265;
@@ -42,11 +43,9 @@ export function useCanvas(matrix, looked) {
   const dark = onDark();
   // Drawn once for each matrix.
   let drawing = null;
-  let asked = null;
   let drawn = 0;
 
   const paint = () => {
-    asked = null;
     const context = canvas.value?.getContext("2d");
     if (!context || !matrix() || !room.value.clientWidth) return;
     const { width, height } = canvas.value;
@@ -54,9 +53,6 @@ export function useCanvas(matrix, looked) {
     drawing = drawing?.ground ? drawing : groundOf(matrix(), width, height, looks);
     compose(context, drawing, looked(), looks);
     canvas.value.dataset.drawn = ++drawn;
-  };
-  const wake = () => {
-    asked ??= requestAnimationFrame(paint);
   };
   const anew = () => {
     // Until it is drawn, people point at the layout that they see.
@@ -73,22 +69,12 @@ export function useCanvas(matrix, looked) {
     canvas.value.style.width = canvas.value.style.height = `${length / ratioNow()}px`;
     anew();
   };
+  const wake = usePainting(room, paint, resize);
   watch(dark, anew);
-  keepSize(room, resize);
-  onUnmounted(() => cancelAnimationFrame(asked));
   const under = (event) => {
     if (!drawing || !matrix()) return null;
     const box = canvas.value.getBoundingClientRect();
     return cellUnder(drawing.layout, [event.clientX - box.left, event.clientY - box.top]);
   };
   return { canvas, room, wake, anew, resize, under };
-}
-
-function keepSize(room, resize) {
-  const observer = new ResizeObserver(resize);
-  onMounted(() => {
-    resize();
-    observer.observe(room.value);
-  });
-  onUnmounted(() => observer.disconnect());
 }

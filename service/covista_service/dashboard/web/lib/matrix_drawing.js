@@ -1,5 +1,5 @@
 // Draws a matrix of robots ordered by group: cells by colour, unknown ones hatched, groups outlined and named.
-import { colourAt, css, inkOn, table } from "covista/colour_scale.js";
+import { colourAt, inkOn, table } from "covista/colour_scale.js";
 import { colourOf, shapeOf, trace } from "covista/looks.js";
 
 const NAMES_FROM_PX = 13;
@@ -34,7 +34,7 @@ export function cellUnder(layout, [x, y]) {
 }
 
 // Cells as pictures of a pixel each: how strong known ones are, and where unknown ones are.
-export function cellsOf({ values, order, measure }, dark, size) {
+function cellsOf({ values, order, measure }, dark, size) {
   const count = order.length;
   const colours = table(dark);
   const [known, unknown] = [new ImageData(count, count), new ImageData(count, count)];

@@ -12,9 +12,9 @@ const STEPS_S = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 
 
 export const msOf = (time) => Date.parse(time);
 export const clock = (ms) => CLOCK.format(ms);
-// As UTC+2; of now, for in winter it may be another.
-export const zone = () =>
-  ZONE.formatToParts(Date.now()).find((part) => part.type === "timeZoneName").value.replace("GMT", "UTC").replace(/[+-]0$/, "");
+// As UTC+2, which it was then: in winter it may be another.
+export const zone = (ms) =>
+  ZONE.formatToParts(ms).find((part) => part.type === "timeZoneName").value.replace("GMT", "UTC").replace(/[+-]0$/, "");
 
 // With the day, where it is not today.
 export const spoken = (ms, now = Date.now()) => (DAY.format(ms) === DAY.format(now) ? CLOCK : FULL).format(ms);

@@ -2,7 +2,7 @@
 const MAGIC = "\x93NUMPY";
 
 // All arrays of a file: { shape, values }, values being a Float64Array or a list of texts, row by row.
-export function arraysOf(buffer) {
+function arraysOf(buffer) {
   const arrays = [];
   for (let at = 0; at < buffer.byteLength; ) {
     const { kind, size, shape, start } = headAt(buffer, at);

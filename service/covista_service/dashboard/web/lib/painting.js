@@ -1,7 +1,8 @@
 // A canvas that is painted anew when something has changed, once a frame of the screen at most.
 import { onMounted, onUnmounted } from "vue";
 
-// For `setup`. `resized` hears that the element has another size; what is given back asks for a painting.
+// For `setup`. `element` is a ref of what gives the canvas its size, the canvas itself or what it lies in; `resized` hears
+// that it has another. What is given back asks for a painting.
 export function usePainting(element, paint, resized = () => {}) {
   let asked = null;
   const painted = (now) => {
@@ -15,7 +16,11 @@ export function usePainting(element, paint, resized = () => {}) {
     resized();
     wake();
   });
-  onMounted(() => observer.observe(element.value));
+  onMounted(() => {
+    // What is there to be drawn at once is not to be drawn in no size.
+    resized();
+    observer.observe(element.value);
+  });
   onUnmounted(() => {
     observer.disconnect();
     cancelAnimationFrame(asked);

@@ -21,7 +21,13 @@ export function usePairFacts(pair) {
   async function ask() {
     const [a, b] = pair.value ?? [];
     if (!isId(a) || !isId(b) || a === b) return;
-    const found = await asked(data(`/pair?a=${a}&b=${b}`));
+    let found;
+    try {
+      found = await asked(data(`/pair?a=${a}&b=${b}`));
+    } finally {
+      // What else goes by the station's clock does not wait for ever.
+      aheadMs.value ??= 0;
+    }
     aheadMs.value = msOf(found.time) - Date.now();
     if (pair.value?.[0] !== a || pair.value?.[1] !== b) return;
     problem.value = found.problem ?? "";

@@ -25,7 +25,7 @@ export default {
       minutes.value = value;
       choose({ minutes: value });
     };
-    return { minutes, past, problem, names, open, rows, span, clock, percent, SPANS, FOUND, ROWS };
+    return { minutes, past, problem, names, open, rows, span, clock, percent, SPANS, FOUND };
   },
   template: `
     <section class="cv-card" aria-labelledby="cv-past">

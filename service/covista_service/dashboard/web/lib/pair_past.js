@@ -20,7 +20,7 @@ const gapOf = ({ since, until, lost, reason }) => ({
 });
 
 // Moments in the order of time, each once; what was read again counts.
-export function joined(held, found, from) {
+function joined(held, found, from) {
   const all = new Map(held.map((each) => [each.key, each]));
   for (const each of found) all.set(each.key, each);
   const sorted = [...all.values()].sort((p, q) => p.ms - q.ms);

@@ -8,7 +8,7 @@ const FEW = 16;
 const TOLD = 12;
 
 // Round values that cover a span, at most six of them.
-export function ticksOf(low, high) {
+function ticksOf(low, high) {
   const span = high - low || 1;
   const power = 10 ** Math.floor(Math.log10(span / 4));
   const step = [1, 2, 5, 10].map((each) => each * power).find((each) => span / each <= 5);
@@ -55,7 +55,7 @@ export default {
       const all = told.length === props.scores.length ? "Scores by number of groups" : `The ${TOLD} best scores by number of groups`;
       return `${all}: ${told.map((each) => `${each.groups}: ${each.score.toFixed(2)}`).join(", ")}. Shown: ${props.chosen ?? "none"}; best: ${bestOf(props.scores)?.groups ?? "none"}.`;
     });
-    return { room, width, chart, words, HEIGHT, LEFT, RIGHT, TOP, BOTTOM };
+    return { room, width, chart, words, HEIGHT, LEFT, RIGHT, BOTTOM };
   },
   template: `
     <div ref="room" class="cv-chart">

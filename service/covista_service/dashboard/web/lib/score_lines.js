@@ -1,5 +1,6 @@
 // The score of every number of groups under two settings: a line each, the highest marked, and the same as a table.
 import { computed } from "vue";
+import { counted } from "covista/looks.js";
 import { bestOf } from "covista/score_best.js";
 
 const [WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM] = [360, 150, 14, 12, 12, 24];
@@ -37,7 +38,7 @@ export default {
     });
     const scoreOf = (report, groups) => report.scores.find((each) => each.groups === groups)?.score;
     const words = computed(() =>
-      lines.value.map(({ title, top }) => `${title}: ${top.groups} groups score highest, ${top.score.toFixed(2)}`).join("; "));
+      lines.value.map(({ title, top }) => `${title}: ${counted(top.groups, "group")} score${top.groups === 1 ? "s" : ""} highest, ${top.score.toFixed(2)}`).join("; "));
     return { alike, reports, numbers, lines, ticks, scoreOf, words, WIDTH, HEIGHT, LEFT, RIGHT, BOTTOM };
   },
   template: `

@@ -9,6 +9,8 @@ const NAMES_PX = 46;
 const NAMED_FROM_PX = 11;
 const BAR = 4;
 const MOST_PAIRS = 20;
+// Of more robots the station tells only the strongest pairs of each.
+const THINNED_ABOVE = 60;
 const LIGHT = { paper: "#ffffff", none: "#ececea", full: "#003f73", ink: "#1c1c1c" };
 const DARK = { paper: "#1b2128", none: "#2a323b", full: "#7cc4ff", ink: "#e8e8e8" };
 
@@ -104,9 +106,11 @@ export default {
       if (!of || !by || of === by) pointed.value = "";
       else pointed.value = sentence(of.id, by.id, shares.value.get(row * robots.value.length + column));
     };
-    // Of a large swarm only the strongest of each robot are drawn.
-    const sentence = (of, by, share) =>
-      share === undefined ? `${by} sees next to nothing of ${of}'s view, or both see more with others.` : `${by} sees ${percent(share)} of ${of}'s view.`;
+    const sentence = (of, by, share) => {
+      if (share !== undefined) return `${by} sees ${percent(share)} of ${of}'s view.`;
+      const thinned = robots.value.length > THINNED_ABOVE ? ", or each shares more with others" : "";
+      return `That ${by} sees any of ${of}'s view is not known, or it is next to nothing${thinned}.`;
+    };
     const words = computed(() => `Matrix of ${robots.value.length} robots: in each row, how much of its robot's view the others see. ${pairs.value.length} pairs are listed below.`);
     return { canvas, pointed, pairs, words, move, percent, page };
   },

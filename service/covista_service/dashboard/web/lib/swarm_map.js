@@ -1,7 +1,7 @@
 // The swarm from above: moves, zooms, follows. What it shows is in lists beside it too, for who does not see it.
 import { computed, onMounted, ref, watch } from "vue";
 import { onDark } from "covista/dark.js";
-import { byLabel } from "covista/looks.js";
+import { byLabel, counted } from "covista/looks.js";
 import { draw } from "covista/map_drawing.js";
 import { Motion } from "covista/map_motion.js";
 import { usePointing } from "covista/map_pointing.js";
@@ -24,8 +24,8 @@ function follow(view, followed, shown, ease) {
 
 function inWords(robots, labels) {
   const silent = robots.filter((robot) => robot.status !== "live").length;
-  const groups = labels.length === 1 ? "1 group" : `${labels.length} groups`;
-  return `Map from above: ${robots.length} robots in ${groups}, ${silent} of them silent. Arrow keys move it, plus and minus zoom, 0 shows all.`;
+  const [who, groups] = [counted(robots.length, "robot"), counted(labels.length, "group")];
+  return `Map from above: ${who} in ${groups}, ${silent} of them silent or gone. Arrow keys move it, plus and minus zoom, 0 shows all.`;
 }
 
 export default {
@@ -53,6 +53,7 @@ export default {
     });
     const wake = usePainting(canvas, (now) => {
       const shown = motion.now(now);
+      // Into the first picture nobody glides.
       const moving = follow(view, followed.value, shown, drawn < 2 || still.matches ? 1 : EASE);
       const how = { chosen: props.chosen, hovered: hovered.value, dark: dark.value };
       draw(contextOf(canvas.value, ...view.size), view, shown, props.frame?.edges ?? [], how);

@@ -3,12 +3,11 @@ import { reactive, ref, watch } from "vue";
 import { write } from "covista/address.js";
 import { page } from "covista/ask.js";
 import { KINDS } from "covista/event_list.js";
-import { msOf } from "covista/moments.js";
+import { msOf, spoken } from "covista/moments.js";
 
 export const [SHORTEST_S, LONGEST_S] = [10, 2592000];
 const USUAL = { span: 300, show: ["Groups", "Robots"] };
 const NO_TIME = "The time in the address is none, so this is now. One looks like 2026-05-04T12:30:15Z.";
-const TO_COME = "The time in the address is still to come, so this is now.";
 
 // What the address says: ?time=2026-05-04T12:30:15Z&span=3600&show=Groups,Robots
 function fromAddress() {
@@ -66,8 +65,9 @@ export function useWindow(nowMs, bandsEnd) {
   const settle = () => {
     if (untilMs.value !== null) untilMs.value = Math.min(nowMs(), untilMs.value);
     if (shown.time === null || msOf(shown.time) <= nowMs()) return;
+    const time = spoken(msOf(shown.time));
     live();
-    strange.value = TO_COME;
+    strange.value = `${time} is still to come, so this is now.`;
   };
   watch(shown, () => write(addressOf(shown)));
   return { shown, strange, untilMs, scrub, live, spanned, shift, settle };

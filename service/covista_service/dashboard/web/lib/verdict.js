@@ -1,5 +1,6 @@
 // What a preview comes to, in words.
 import { computed } from "vue";
+import { counted } from "covista/looks.js";
 import { movers } from "covista/would_be.js";
 
 const MOST_NAMED = 8;
@@ -8,7 +9,7 @@ export const named = (robots) => {
   const first = robots.slice(0, MOST_NAMED).join(", ");
   return robots.length > MOST_NAMED ? `${first} and ${robots.length - MOST_NAMED} more` : first;
 };
-const number = (count) => `${count} ${count === 1 ? "group" : "groups"}`;
+const number = (count) => counted(count, "group");
 
 function summed(now, then, moved) {
   const [before, after] = [now.groups.length, then.groups.length];

@@ -7,7 +7,7 @@ import GroupMark from "covista/group_mark.js";
 // Of a group so many robots are shown at once; who would move always is.
 const SHOWN = 24;
 
-export const labelsOf = (report) =>
+const labelsOf = (report) =>
   new Map((report?.groups ?? []).flatMap(({ label, robots }) => robots.map((robot) => [robot, label])));
 
 // Who stands elsewhere in another answer: robot, from, to; null is no group.
