@@ -50,7 +50,7 @@ def _shared(pair: PairView, a: str, b: str) -> Iterator[str]:
         yield f"They see nothing in common ({_HOW.get(pair.found_by, 'measured')})."
     else:
         how = _HOW.get(pair.found_by, "measured")
-        yield f"{b} sees {of_a:.0%} of {a}'s view, {a} sees {of_b:.0%} of {b}'s ({how})."
+        yield f"{b} sees {100 * of_a:.0f} % of {a}'s view, {a} sees {100 * of_b:.0f} % of {b}'s ({how})."
 
 
 def _others(snapshot: Snapshot, a: RobotView, b: RobotView) -> Iterator[str]:
@@ -59,11 +59,9 @@ def _others(snapshot: Snapshot, a: RobotView, b: RobotView) -> Iterator[str]:
     place = {name: k for k, name in enumerate(similarity.robots)}
     if a.group is None or b.group is None or a.id not in place or b.id not in place:
         return
+    theirs = similarity.similarity[place[a.id], place[b.id]]
+    yield f"Their similarity is {theirs:.2f}; groups are made so that similarity is high within and low between them."
     if a.group == b.group:
-        yield (
-            f"Their similarity is {similarity.similarity[place[a.id], place[b.id]]:.2f}; groups are made so that it is "
-            "high within them and low between them."
-        )
         return
     for one, group in ((a, b.group), (b, a.group)):
         yield _drawn_to(one, group, *(_mean(snapshot, place, one, each) for each in (one.group or "", group)))

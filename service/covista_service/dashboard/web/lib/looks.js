@@ -57,5 +57,7 @@ export const silence = (status, seconds) => (seconds === null ? status : `${stat
 export function ago(seconds) {
   if (seconds === null || seconds === undefined) return "never";
   if (seconds < 90) return `${Math.round(seconds)} s`;
+  // Who watches a robot that is silent sees the time go on.
+  if (seconds < 600) return `${Math.floor(seconds / 60)} min${seconds % 60 < 1 ? "" : ` ${Math.floor(seconds % 60)} s`}`;
   return seconds < 5400 ? `${Math.round(seconds / 60)} min` : `${Math.round(seconds / 360) / 10} h`;
 }

@@ -71,13 +71,15 @@ function drawTrack(context, window, { robot, at, track }, dark) {
 function drawEdges(context, edges, where, look, chosen, many) {
   const classes = Array.from({ length: CLASSES }, () => []);
   const marked = [];
+  // Of two who are chosen the line between them counts, of one all of its lines.
+  const counts = ({ a, b }) => (chosen.length > 1 ? chosen.includes(a) && chosen.includes(b) : chosen.includes(a) || chosen.includes(b));
   for (const edge of edges) {
     const from = where.get(edge.a);
     const to = where.get(edge.b);
     if (!from || !to) continue;
     const share = Math.max(edge.ofFirst, edge.ofSecond);
     const drawn = [from, to, Math.min(CLASSES - 1, Math.floor(CLASSES * share))];
-    if (chosen.includes(edge.a) || chosen.includes(edge.b)) marked.push(drawn);
+    if (counts(edge)) marked.push(drawn);
     else classes[drawn[2]].push(drawn);
   }
   const width = (level) => (many ? 0.6 + 0.5 * level : 1 + 1.4 * level);

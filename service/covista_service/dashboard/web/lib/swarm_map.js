@@ -95,7 +95,8 @@ export default {
       <figcaption class="cv-legend">
         <group-mark v-for="label in labels" :key="label" :label="label"></group-mark>
         <span>filled: live</span><span>dashed: stale, silent for a while</span><span>crossed out: gone</span>
-        <span>line: views in common, the thicker the more</span><span>wedge: field of view, its beginning</span><span>tail: the last minute's way</span>
+        <span>line: views in common, the thicker the more</span><span>ring, and line in full ink: chosen</span>
+        <span>wedge: where it looks; its view goes on beyond</span><span>tail: its way of the last minute</span>
       </figcaption>
     </figure>`,
 };
