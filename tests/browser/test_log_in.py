@@ -81,9 +81,14 @@ def test_who_logs_out_is_out_on_all_pages(stranger: Visitor, locked: LockedStati
     other = page.context.new_page()
     other.goto("/dashboard/")
     stands(other, "Swarm")
+    page.evaluate("sessionStorage.setItem('covista-applied', '[]')")
     page.get_by_role("button", name="Log out reader").click()
     page.get_by_label("Token").wait_for()
+    # Who logs in next is not told what was done here, and sees nothing on the other page.
+    assert page.evaluate("sessionStorage.getItem('covista-applied')") is None
     notice(other).get_by_text("You are not logged in any more").wait_for()
+    other.get_by_role("heading", name="Groups").wait_for(state="hidden")
+    other.get_by_role("button", name="Log out").wait_for(state="hidden")
     other.get_by_role("link", name="Log in").click()
     other.get_by_label("Token").wait_for()
     page.go_back()

@@ -114,6 +114,19 @@ def test_two_who_are_chosen_are_those_that_why_is_told_of(still: Page) -> None:
     expect(why.get_by_role("link", name="What both see")).to_have_attribute("href", "/dashboard/pairs/r5/r3")
 
 
+def test_who_is_chosen_stands_in_the_address(still: Page) -> None:
+    robot(still, "r2").click()
+    robot(still, "r5").click()
+    still.wait_for_url("**/dashboard/?a=r2&b=r5")
+    still.reload()
+    expect(robot(still, "r2")).to_have_attribute("aria-pressed", "true")
+    expect(still.get_by_role("region", name="Why?").get_by_label("and")).to_have_value("r5")
+    # Whom nobody knows nobody can choose.
+    still.goto("/dashboard/?a=r2&b=r99")
+    expect(robot(still, "r2")).to_have_attribute("aria-pressed", "true")
+    still.wait_for_url("**/dashboard/?a=r2")
+
+
 def test_nothing_lies_on_the_map(still: Page) -> None:
     over = chart(still).evaluate("""canvas => {
         const box = canvas.getBoundingClientRect();

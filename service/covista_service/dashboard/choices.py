@@ -94,7 +94,7 @@ SECTIONS: tuple[tuple[str, tuple[Choice, ...]], ...] = (
             Choice(
                 "hysteresis.persistence_s",
                 "Wait",
-                "A change that is not clear is shown when it has lasted so long.",
+                "A change that is not clear is shown when it has lasted so long; a clear one at once.",
                 "number",
                 0.5,
                 _FAR_S,

@@ -33,7 +33,7 @@ function whyNone(look, facts) {
   const why = facts?.why_not;
   if (why) return `None. ${why}`;
   if (facts?.inliers) return "None in these keyframes: they were not compared with one another.";
-  return "None in these keyframes: nothing was matched in both images yet. The overlap is predicted.";
+  return "None in these keyframes: nothing was matched in both.";
 }
 
 export default {

@@ -48,7 +48,10 @@ export default {
       const [trouble] = standing.troubles.values();
       return restarted + (trouble ? `Part of this page may be from before: ${trouble}. Trying again.` : "");
     });
-    return { session, standing, noteRestart, words, dark, turn, logIn, logOut: page("/session/end") };
+    // What was seen and done here is not for who logs in next.
+    watch(() => standing.loggedOut, (out) => document.body.classList.toggle("cv-out", out));
+    const forget = () => sessionStorage.clear();
+    return { forget, session, standing, noteRestart, words, dark, turn, logIn, logOut: page("/session/end") };
   },
   template: `
     <div class="cv-standing">
@@ -57,7 +60,7 @@ export default {
         <button v-else-if="standing.restartedAt && standing.lostSince === null" @click="noteRestart(null)">OK</button>
       </p>
       <button class="cv-quiet" @click="turn">{{ dark ? "Switch to light" : "Switch to dark" }}</button>
-      <form v-if="session?.name" method="post" :action="logOut">
+      <form v-if="session?.name && !standing.loggedOut" method="post" :action="logOut" @submit="forget">
         <button class="cv-quiet" type="submit">Log out {{ session.name }}</button>
       </form>
     </div>`,

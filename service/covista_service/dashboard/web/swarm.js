@@ -1,5 +1,6 @@
 // The swarm in one look: the map, the groups, and why two robots are apart or together.
 import { computed, ref, watch } from "vue";
+import { choose as writeChosen, chosenIn } from "covista/address.js";
 import { asked, data, page } from "covista/ask.js";
 import { ago, byLabel, byName, REASONS, silence } from "covista/looks.js";
 import { pulse } from "covista/pulse.js";
@@ -27,7 +28,8 @@ export default {
     const quiet = computed(() => robots.value.filter((robot) => robot.group && robot.status !== "live"));
     const names = computed(() => robots.value.map((robot) => robot.id).sort(byName));
 
-    const chosen = ref([]);
+    const chosen = ref(["a", "b"].map(chosenIn).filter(Boolean));
+    watch(chosen, ([a, b]) => writeChosen({ a, b }));
     const choose = (name) => {
       if (chosen.value.includes(name)) chosen.value = chosen.value.filter((each) => each !== name);
       else chosen.value = [...chosen.value, name].slice(-2);

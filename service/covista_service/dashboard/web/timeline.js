@@ -79,7 +79,7 @@ export default {
       <p v-if="problem" class="cv-problem" role="alert">The past cannot be shown now: {{ problem }}. Trying again.</p>
       <p v-if="!bands && !problem">Asking the station.</p>
       <template v-if="bands">
-        <p v-if="!bands.robots.length">No groups are kept of this time. Choose a longer one, or go earlier.</p>
+        <p v-if="!bands.robots.length">No groups are kept of this time: choose a longer one, or another.</p>
         <group-bands :bands="bands" :events="events.items" :time="shown.time" @scrub="scrub"></group-bands>
         <p class="cv-soft">Times are in {{ zone(bands.until_ms) }}.{{ otherClock }}
           <template v-if="bands.thinned">So long a time is thinned: groups are looked at now and then, and short changes between are not drawn. Zoom in to see all.</template></p>

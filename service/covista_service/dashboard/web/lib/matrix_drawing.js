@@ -170,7 +170,10 @@ function names(context, { margin, cell, withNames }, { robots, order, blocks }, 
     pen.fillText(words, out * room, 0);
     if (label === undefined) return;
     pen.fillStyle = colourOf(label, dark);
-    trace(pen, shapeOf(label), out * (room + pen.measureText(words).width + 9), 0, 5);
+    pen.translate(out * (room + pen.measureText(words).width + 9), 0);
+    // Words above columns are turned, and a shape that is turned is another.
+    if (align === "left") pen.rotate(Math.PI / 2);
+    trace(pen, shapeOf(label), 0, 0, 5);
     pen.fill();
   };
   context.textBaseline = "middle";
@@ -208,8 +211,8 @@ export function drawChosen(context, { margin, cell, count }, [row, column], { in
     frame([margin + column * cell, margin, cell, side], 1);
   } else if (row !== column) frame(spot(column, row), 1.5, [4, 4]);
   frame(spot(row, column), 3);
-  const edge = margin - BAND_PX - 3;
+  // Beside the colours of the groups, not over them.
   context.fillStyle = ink;
-  context.fillRect(edge, margin + row * cell, BAND_PX, Math.max(3, cell));
-  context.fillRect(margin + column * cell, edge, Math.max(3, cell), BAND_PX);
+  context.fillRect(margin - 3, margin + row * cell, 2, Math.max(3, cell));
+  context.fillRect(margin + column * cell, margin - 3, Math.max(3, cell), 2);
 }
