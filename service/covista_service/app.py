@@ -19,7 +19,8 @@ from covista_service.api.deps import Parts, State
 from covista_service.api.docs_page import DOCS
 from covista_service.api.stream import Stream
 from covista_service.config import Settings, with_stored
-from covista_service.dashboard.mounting import add_pages, opened
+from covista_service.dashboard.mounting import add_pages
+from covista_service.dashboard.opening import opened
 from covista_service.dashboard.places import PAGES, has_pages
 from covista_service.dashboard.sources import Sources
 from covista_service.grouping.warming import warm_up

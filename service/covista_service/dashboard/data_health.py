@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fastapi import APIRouter, Response
-from nicegui.client import Client
 from prometheus_client import CollectorRegistry, ProcessCollector
 from pydantic_core import to_json
 
 from covista_service.dashboard.checkup import Checkup, Timings
 from covista_service.dashboard.data import JSON
 from covista_service.dashboard.health_words import told
-from covista_service.dashboard.serving import MOST_PAGES
+from covista_service.dashboard.opening import open_pages
+from covista_service.dashboard.places import MOST_PAGES
 from covista_service.dashboard.sources import Sources, SourcesNow
 
 _LATENCY, _TURN = "covista_keyframe_to_groups_seconds", "covista_turn_seconds_sum"
@@ -41,7 +41,7 @@ def _look(sources: Sources) -> bytes:
         refused=sources.gate.refused,
         given_up=sources.given_up(),
         listeners=sources.listeners(),
-        pages=len(Client.instances),
+        pages=open_pages(),
         most_pages=MOST_PAGES,
     )
     return to_json({"station": sources.name, **told(checkup)})

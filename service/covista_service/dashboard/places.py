@@ -10,6 +10,8 @@ PREFIX = "/dashboard"
 LOG_IN = "/log-in"
 # With none at all a browser would not say either from where a form is sent.
 REFERRER = "same-origin"
+# Pages that are open at a time: each holds some memory.
+MOST_PAGES = 256
 FILES = ("/_nicegui/", "/files/")
 PAGES = Pages(
     prefix=PREFIX,

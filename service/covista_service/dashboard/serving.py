@@ -19,12 +19,10 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from covista_service.dashboard import pages
-from covista_service.dashboard.places import FILES, PAGES, PREFIX, REFERRER
+from covista_service.dashboard.places import FILES, MOST_PAGES, PAGES, PREFIX, REFERRER
 from covista_service.dashboard.sockets import bounded_sockets
 
 WEB = Path(__file__).parent / "web"
-# Pages that are open at a time: each holds some memory.
-MOST_PAGES = 256
 # A browser that was cut off has so long to come back to its page as it was.
 _RECONNECT_S = 10.0
 # Everything from the station itself. The framework puts its templates together in the browser.
@@ -78,6 +76,11 @@ def application() -> ASGIApp:
     return _with_policy(bounded_sockets(pages_app))
 
 
+def open_pages() -> int:
+    """How many are open now."""
+    return len(Client.instances)
+
+
 async def _nothing_there(_request: Request, _error: Exception) -> Response:
     return _NONE
 
@@ -117,4 +120,4 @@ def _served(scope: Scope, app: ASGIApp) -> ASGIApp:
         return _NONE
     # Whoever asks could write it, and pages would have it in all their addresses.
     scope["headers"] = [(name, value) for name, value in scope["headers"] if name != b"x-forwarded-prefix"]
-    return _FULL if len(Client.instances) >= MOST_PAGES and not path.startswith(_FILES) else app
+    return _FULL if open_pages() >= MOST_PAGES and not path.startswith(_FILES) else app
