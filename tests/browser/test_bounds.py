@@ -128,6 +128,7 @@ def test_pages_that_never_read_cost_little_and_are_forgotten(locked: LockedStati
 
 def test_too_many_pages_are_refused_in_words_and_the_others_go_on(locked: LockedStation) -> None:
     with somebody(locked) as client:
+        client.get("/dashboard/")
         before_mb = held_mb(locked.station)
         statuses = [client.get("/dashboard/").status_code for _ in range(MOST_PAGES + 10)]
         assert statuses[-10:] == [503] * 10
