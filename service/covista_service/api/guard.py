@@ -99,7 +99,7 @@ def guarded(pages: Pages | None = None) -> Callable[[ASGIApp], ASGIApp]:
                 await refusal(scope, receive, send)
                 return
             scope[BY] = found.by
-            await app(scope, receive, send if wanted is None else _while_let_in(scope, found.by, send))
+            await app(scope, receive, send if wanted is None else _while_let_in(scope, found.by, wanted, send))
 
         return answer
 
@@ -142,26 +142,41 @@ def _to_log_in(scope: Request, pages: Pages) -> Response:
     return RedirectResponse(f"{root}{pages.prefix}{pages.log_in}?next={quote(back)}", HTTPStatus.SEE_OTHER)
 
 
-def _while_let_in(scope: Request, by: str | None, send: Send) -> Send:
+def _while_let_in(scope: Request, by: str | None, wanted: Scope, send: Send) -> Send:
     """Sends until the token is revoked, the session ends, or the first token is made: a stream would outlive that."""
     gate, headers = _gate_of(scope), Headers(scope=scope)
     session = _session_of(headers) if "authorization" not in headers else ""
     over = is_stream = False
+    start: Message | None = None
 
     async def sending(message: Message) -> None:
-        nonlocal over, is_stream
+        nonlocal over, is_stream, start
         if over:
             return
         if message["type"] == "http.response.start":
             is_stream = Headers(raw=message["headers"]).get("content-type", "").startswith(EVENT_STREAM)
+            if not is_stream:
+                # Goes with what comes first: an answer of which nothing is out is refused, not cut.
+                start = message
+                return
         elif not (gate.holds(session) if session else gate.keyring.lets_in(by)):
             over = True
-            ended = Refusal.SESSION if session else Refusal.REVOKED
-            await _cut(scope, send, Refusal.MISSING if by is None else ended, is_stream)
+            reason = Refusal.MISSING if by is None else Refusal.SESSION if session else Refusal.REVOKED
+            if start is None:
+                await _cut(scope, send, reason, is_stream)
+            else:
+                await _refusal(Refused(reason), scope["path"], wanted)(scope, _nothing_more, send)
             return
+        if start is not None:
+            begin, start = start, None
+            await send(begin)
         await send(message)
 
     return sending
+
+
+async def _nothing_more() -> Message:
+    return {"type": "http.disconnect"}
 
 
 async def _cut(scope: Request, send: Send, reason: Refusal, is_stream: bool) -> None:

@@ -238,6 +238,20 @@ def test_an_answer_under_way_ends_when_its_token_is_revoked_or_the_first_one_mad
     assert desk.ask("/stream", **token).status_code == 401
 
 
+def test_an_answer_of_which_nothing_is_out_yet_is_refused_as_a_whole() -> None:
+    guarded = Guarded()
+
+    def parts() -> Iterator[str]:
+        guarded.shelf.revoke("reader")
+        guarded.desk.gate.keyring.take(guarded.shelf.read())
+        yield "too late"
+
+    guarded.desk.app.get("/stream")(lambda: StreamingResponse(parts()))
+    answer = guarded.ask("/stream", guarded.reader)
+    assert answer.status_code == 401
+    assert Problem.model_validate_json(answer.text).detail == "this token is revoked"
+
+
 @pytest.mark.parametrize(("open_at_first", "said"), [(False, "this token is revoked"), (True, "a token is needed")])
 def test_a_stream_that_may_not_go_on_has_a_last_word_that_says_why(open_at_first: bool, said: str) -> None:
     guarded = Guarded()
