@@ -159,6 +159,9 @@ def _while_let_in(scope: Request, by: str | None, wanted: Scope, send: Send) -> 
                 # Goes with what comes first: an answer of which nothing is out is refused, not cut.
                 start = message
                 return
+        elif start is not None and not message.get("more_body", False):
+            # Ready as a whole for who was let in when it was asked for; to log out is to be told so, too.
+            pass
         elif not (gate.holds(session) if session else gate.keyring.lets_in(by)):
             over = True
             reason = Refusal.MISSING if by is None else Refusal.SESSION if session else Refusal.REVOKED

@@ -252,6 +252,19 @@ def test_an_answer_of_which_nothing_is_out_yet_is_refused_as_a_whole() -> None:
     assert Problem.model_validate_json(answer.text).detail == "this token is revoked"
 
 
+def test_an_answer_that_is_whole_goes_to_who_was_let_in_when_it_was_asked_for() -> None:
+    guarded = Guarded()
+
+    @guarded.desk.app.get("/whole")
+    def whole() -> str:
+        guarded.shelf.revoke("reader")
+        guarded.desk.gate.keyring.take(guarded.shelf.read())
+        return "all of it"
+
+    assert guarded.ask("/whole", guarded.reader).json() == "all of it"
+    assert guarded.ask("/whole", guarded.reader).status_code == 401
+
+
 @pytest.mark.parametrize(("open_at_first", "said"), [(False, "this token is revoked"), (True, "a token is needed")])
 def test_a_stream_that_may_not_go_on_has_a_last_word_that_says_why(open_at_first: bool, said: str) -> None:
     guarded = Guarded()
